@@ -1,0 +1,44 @@
+# Everything a fresh machine needs: Python 3.11 and make. `make help` lists the commands.
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+VENV := .venv
+OLDEST := .venv-oldest
+RUN := $(VENV)/bin/python
+PLATFORM ?=
+SEGMENTS ?= 6
+
+.PHONY: help demo test test-oldest lint zip clean
+
+help:  ## list the commands
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
+
+demo: $(VENV)/.ready  ## build a creature, learn its parts, check them on unseen poses (INPUT=file.glb: your own)
+	$(RUN) -m wks_segment demo --segments $(SEGMENTS) $(if $(INPUT),--input "$(INPUT)")
+
+test: $(VENV)/.ready  ## all tests
+	$(RUN) -m pytest
+
+test-oldest: $(OLDEST)/.ready  ## all tests on the oldest Blender that is supported
+	$(OLDEST)/bin/python -m pytest
+
+lint: $(VENV)/.ready  ## ruff and mypy
+	$(RUN) -m ruff check .
+	$(RUN) -m ruff format --check .
+	$(RUN) -m mypy
+
+zip: $(VENV)/.ready  ## the extension for each platform, in dist/ (PLATFORM=linux-x64: for one)
+	$(RUN) scripts/build_zip.py $(if $(PLATFORM),--platform $(PLATFORM))
+
+clean:  ## remove the environments and all that was built
+	rm -rf $(VENV) $(OLDEST) dist wheels demo
+
+$(VENV)/.ready: pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || \
+		{ echo "Python 3.11 is needed (bpy has no wheel for others): make PYTHON=/path/to/python3.11"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(RUN) -m pip install --quiet --disable-pip-version-check --editable ".[dev]"
+	touch $@
+
+$(OLDEST)/.ready: pyproject.toml
+	$(PYTHON) -m venv $(OLDEST)
+	$(OLDEST)/bin/python -m pip install --quiet --disable-pip-version-check --editable ".[oldest]"
+	touch $@

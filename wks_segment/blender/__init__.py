@@ -1,0 +1,32 @@
+"""The extension: everything that knows Blender."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from . import command, operators, panel
+from .settings import WKSSegmentSettings
+
+CLASSES = (WKSSegmentSettings, *operators.CLASSES, *panel.CLASSES)
+COMMAND = "wks_segment"
+
+_commands: list[Any] = []
+"""Handles of the command line, which Blender wants back on unregistering."""
+
+
+def register() -> None:
+    """Called by Blender when the extension is enabled."""
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.types.Scene.wks_segment = bpy.props.PointerProperty(type=WKSSegmentSettings)
+    _commands.append(bpy.utils.register_cli_command(COMMAND, command.run))
+
+
+def unregister() -> None:
+    """Called by Blender when the extension is disabled."""
+    bpy.utils.unregister_cli_command(_commands.pop())
+    del bpy.types.Scene.wks_segment
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

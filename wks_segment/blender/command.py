@@ -1,0 +1,324 @@
+"""The command line: `blender --command wks_segment …` and `python -m wks_segment …`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ..core import PoseSegmentation
+from . import demo, files, tasks
+from . import poses as reader
+from .characters import Character, armature_of, group, mesh_objects
+from .errors import UserError
+from .picture import Tile, render_poses
+from .poses import Pose
+from .settings import WKSSegmentSettings
+from .tasks import Progress, Report
+from .terminal import only_result_on_stdout, table, terminal_progress
+
+OPTIONS = {
+    "--segments": "n_segments",
+    "--seed": "random_state",
+    "--eigenpairs": "n_eigenpairs",
+    "--energies": "n_energies",
+    "--covariance": "covariance_type",
+    "--scaling": "scaling",
+    "--smallest-part": "min_share",
+}
+"""Options that are settings: their text, limits and defaults come from the property group."""
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command; its exit code: 0, 1 (failed, the reason on standard error) or 2 (wrong usage)."""
+    options = _parser().parse_args(arguments)
+    with only_result_on_stdout() as stdout:
+        try:
+            with terminal_progress() as progress:
+                result = options.run(options, progress)
+        except UserError as error:
+            print(f"wks_segment: {error}", file=sys.stderr)
+            if options.json:
+                print(json.dumps({"error": str(error)}), file=stdout)
+            return 1
+        print(json.dumps(result) if options.json else _text(result), file=stdout)
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="wks_segment", description="The same parts, labels and colours in every pose of a character."
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    segment = commands.add_parser("segment", help="learn parts from the poses in files, and write them")
+    _add_poses(segment)
+    _add_settings(segment)
+    segment.add_argument("--model", type=Path, help="write the model to this file")
+    _add_outputs(segment)
+    segment.set_defaults(run=_segment)
+
+    learn = commands.add_parser("learn", help="learn a model from the poses in files")
+    _add_poses(learn)
+    _add_settings(learn)
+    learn.add_argument("--model", type=Path, required=True, help="write the model to this file")
+    learn.set_defaults(run=_segment, output=None, render=None, materials=False)
+
+    apply = commands.add_parser("apply", help="find the parts of a model in files")
+    _add_poses(apply)
+    apply.add_argument("--model", type=Path, required=True, help="a model that learn or segment wrote")
+    _add_setting(apply, "--smallest-part", "min_share")
+    _add_outputs(apply)
+    apply.set_defaults(run=_apply)
+
+    show = commands.add_parser("demo", help="build a creature, learn from some poses, and check on others")
+    show.add_argument("--input", type=Path, help="an animated file in the place of the creature")
+    show.add_argument("--folder", type=Path, default=Path("demo"), help="where results go (default: demo)")
+    show.add_argument("--learn", type=int, default=4, help="poses to learn from (default: 4)")
+    show.add_argument("--unseen", type=int, default=4, help="poses to check on (default: 4)")
+    show.add_argument("--action", help="name of the action to take the poses from")
+    _add_settings(show)
+    show.set_defaults(run=_demo)
+
+    for command in (segment, learn, apply, show):
+        command.add_argument("--json", action="store_true", help="print one JSON object")
+    return parser
+
+
+def _add_poses(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("files", type=Path, nargs="+", metavar="FILE", help=", ".join(files.IMPORTERS))
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--frames", type=_frames, metavar="FIRST:LAST:COUNT",
+        help="take poses from frames of each file's animation; COUNT alone: of its whole action",
+    )  # fmt: skip
+    where.add_argument("--shape-keys", type=int, metavar="COUNT", help="take poses from shape keys")
+    parser.add_argument("--action", help="name of the action to take the frames from")
+    parser.add_argument(
+        "--object", action="append", metavar="NAME", help="use this object only; may be given several times"
+    )
+
+
+def _add_outputs(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--output", type=Path, help=f"write the scene to this file ({', '.join(files.EXPORTERS)})")
+    parser.add_argument("--render", type=Path, metavar="PNG", help="write a picture of all poses side by side")
+    parser.add_argument("--materials", action="store_true", help="also write a material for each segment")
+
+
+def _add_settings(parser: argparse.ArgumentParser) -> None:
+    for option, name in OPTIONS.items():
+        _add_setting(parser, option, name)
+
+
+def _add_setting(parser: argparse.ArgumentParser, option: str, name: str) -> None:
+    setting = WKSSegmentSettings.bl_rna.properties[name]
+    described: dict[str, Any] = {"dest": name, "help": f"{setting.description} (default: {setting.default})"}
+    if setting.type == "ENUM":
+        described["choices"] = [item.identifier for item in setting.enum_items]
+    else:
+        number = int if setting.type == "INT" else float
+        described["type"] = _within(number, setting.hard_min, setting.hard_max)
+        described["metavar"] = "N"
+    described["help"] = described["help"].replace("%", "%%")
+    parser.add_argument(option, **described)
+
+
+def _within(number: type[int] | type[float], least: float, most: float) -> Any:
+    def parse(text: str) -> float:
+        value = number(text)
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(f"must be from {least} to {most}, not {text}")
+        return value
+
+    parse.__name__ = "whole number" if number is int else "number"
+    return parse
+
+
+def _frames(text: str) -> tuple[int | None, int | None, int]:
+    parts = text.split(":")
+    if len(parts) not in (1, 3) or not all(part.lstrip("-").isdigit() for part in parts) or int(parts[-1]) < 1:
+        raise argparse.ArgumentTypeError(f"must be FIRST:LAST:COUNT or COUNT, whole numbers, not {text!r}")
+    if len(parts) == 1:
+        return None, None, int(text)
+    first, last, count = (int(part) for part in parts)
+    if last < first:
+        raise argparse.ArgumentTypeError(f"the last frame ({last}) is before the first ({first})")
+    return first, last, count
+
+
+def _segment(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
+    """`segment` and, without outputs, `learn`."""
+    _check_outputs(options)
+    files.check_folder(options.model) if options.model else None
+    report = Report([])
+    poses = _read(options, report)
+    settings = _settings(options)
+    model, described = tasks.learn(poses, settings, report, progress)
+    if options.model:
+        _save(model, options.model)
+    if options.output or options.render:
+        _label(model, poses, described, settings, options, report)
+    settings.keep_model(model, report.sentence)
+    if options.output:
+        files.save_scene(options.output)
+    report.warnings += tasks.pose_warnings(poses, from_frames=options.frames is not None)
+    return _result(options, report)
+
+
+def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
+    if not (options.output or options.render):
+        raise UserError("apply has nothing to write: give --output, --render or both")
+    _check_outputs(options)
+    model = _load(options.model)
+    report = Report([], n_segments=model.n_segments)
+    poses = _read(options, report)
+    settings = _settings(options)
+    described = tasks.describe(model, poses, report, progress)
+    _label(model, poses, described, settings, options, report)
+    settings.keep_model(model, f"{options.model.name}: {model.n_segments} segments")
+    if options.output:
+        files.save_scene(options.output)
+    return _result(options, report)
+
+
+def _demo(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
+    if options.input:
+        objects = mesh_objects(files.open_files([options.input])[0])
+        character = group(objects, together=True)[0]
+        _choose_action([character], options.action)
+    else:
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        character = demo.creature(bpy.context)
+    return demo.run(bpy.context, character, _settings(options), options.folder, options.learn, options.unseen, progress)
+
+
+def _check_outputs(options: argparse.Namespace) -> None:
+    if options.output:
+        files.check_output(options.output)
+    if options.render:
+        files.check_folder(options.render)
+
+
+def _read(options: argparse.Namespace, report: Report) -> list[Pose]:
+    """All poses of all files."""
+    poses: list[Pose] = []
+    with report.stage("read"):
+        for path, objects in zip(options.files, files.open_files(options.files), strict=True):
+            characters = _characters(path, objects, options.object)
+            _choose_action(characters, options.action)
+            for character in characters:
+                if options.shape_keys is not None:
+                    poses += reader.read_shape_keys(bpy.context, character.objects[0], options.shape_keys)
+                elif options.frames is not None:
+                    first, last, count = options.frames
+                    if first is None or last is None:
+                        frames = reader.own_frames(bpy.context.scene, character, count)
+                    else:
+                        frames = reader.evenly(first, last, count)
+                    poses += reader.read_frames(bpy.context, character, frames)
+                else:
+                    poses += reader.read_objects(bpy.context, [character])
+    report.poses = poses
+    return poses
+
+
+def _characters(path: Path, objects: list[bpy.types.Object], names: Sequence[str] | None) -> list[Character]:
+    """A .blend file can hold several characters; a file of any other format holds one."""
+    found = mesh_objects(objects)
+    if names:
+        missing = set(names) - {obj.name for obj in found}
+        if missing:
+            raise UserError(f"{path}: there is no mesh object named {', '.join(sorted(missing))}")
+        found = [obj for obj in found if obj.name in names]
+    if not found:
+        raise UserError(f"{path}: there is no mesh in this file")
+    return group(found, together=path.suffix.lower() != ".blend")
+
+
+def _choose_action(characters: Sequence[Character], name: str | None) -> None:
+    """Let the characters' armatures move by the action of that name."""
+    if name is None:
+        return
+    action = bpy.data.actions.get(name)
+    if action is None:
+        known = ", ".join(a.name for a in bpy.data.actions) or "none"
+        raise UserError(f'There is no action named "{name}"; there are: {known}')
+    for character in characters:
+        for obj in character.objects:
+            (armature_of(obj) or obj).animation_data_create().action = action
+
+
+def _settings(options: argparse.Namespace) -> WKSSegmentSettings:
+    """The settings of the scene, with what the command line says."""
+    settings: WKSSegmentSettings = bpy.context.scene.wks_segment
+    for name in OPTIONS.values():
+        value = getattr(options, name, None)
+        if value is not None:
+            setattr(settings, name, value)
+    settings.write_materials = getattr(options, "materials", False)
+    return settings
+
+
+def _label(
+    model: PoseSegmentation, poses: list[Pose], described: list[Any], settings: WKSSegmentSettings,
+    options: argparse.Namespace, report: Report,
+) -> None:  # fmt: skip
+    labels = tasks.label(model, poses, described, settings, report)
+    if options.output:
+        tasks.write(labels, settings, report)
+    if options.render:
+        with report.stage("render"):
+            render_poses([Tile(pose, labels[pose.character], pose.name) for pose in poses], options.render)
+
+
+def _save(model: PoseSegmentation, path: Path) -> None:
+    try:
+        model.save(path)
+    except OSError as error:
+        raise UserError(f"{path}: the model could not be written: {error.strerror or error}") from error
+
+
+def _load(path: Path) -> PoseSegmentation:
+    try:
+        return PoseSegmentation.load(path)
+    except FileNotFoundError:
+        raise UserError(f"{path}: there is no such file") from None
+    except (ValueError, OSError) as error:
+        raise UserError(f"{path}: {error}") from error
+
+
+def _result(options: argparse.Namespace, report: Report) -> dict[str, Any]:
+    outputs = {"model": options.model, "output": options.output, "render": options.render}
+    return {
+        "poses": [
+            {"name": pose.name, "vertices": pose.mesh.n_vertices, "triangles": pose.mesh.n_faces}
+            for pose in report.poses
+        ],
+        "segments": report.n_segments,
+        "seconds": {name: round(seconds, 3) for name, seconds in report.seconds.items()},
+        "warnings": report.warnings,
+        "files": {name: str(path) for name, path in outputs.items() if path is not None},
+    }
+
+
+def _text(result: dict[str, Any]) -> str:
+    """A result as a person reads it."""
+    with_agreement = "agreement" in result["poses"][0]
+    header = ["pose", "vertices", *(["", "agreement"] if with_agreement else [])]
+    rows = [
+        [pose["name"], f"{pose['vertices']:,}"]
+        + (["learned" if pose["learned"] else "unseen", f"{pose['agreement']:.3f}"] if with_agreement else [])
+        for pose in result["poses"]
+    ]
+    stages = [[name, f"{seconds:.1f}"] for name, seconds in result["seconds"].items()]
+    lines = [table(header, rows), "", table(["stage", "seconds"], stages), "", f"{result['segments']} segments"]
+    if with_agreement:
+        lines.append(f"agreement of unseen poses: {result['agreement']:.3f} of the area has the learned label")
+    lines += [f"warning: {warning}" for warning in result["warnings"]]
+    lines += [f"{name}: {path}" for name, path in result["files"].items()]
+    return "\n".join(lines)

@@ -1,0 +1,117 @@
+"""The demo: learn from some poses, apply to others, and measure how well the parts stay the same."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..core.mesh import FloatArray, IntArray
+from . import files, tasks
+from . import poses as reader
+from .characters import Character
+from .creature import FIRST_FRAME, LAST_FRAME, build_creature
+from .errors import UserError
+from .picture import Tile, render_poses
+from .settings import WKSSegmentSettings
+from .tasks import Progress, Report
+
+SUFFIXES = {"scene": ".blend", "picture": ".png", "model": ".json"}
+
+
+def creature(context: bpy.types.Context) -> Character:
+    """Build the creature in the current scene."""
+    scene = context.scene
+    scene.frame_start, scene.frame_end = FIRST_FRAME, LAST_FRAME
+    return Character((build_creature(scene),))
+
+
+def run(
+    context: bpy.types.Context, character: Character, settings: WKSSegmentSettings, folder: Path,
+    n_learned: int, n_unseen: int, progress: Progress,
+) -> dict[str, Any]:  # fmt: skip
+    """Learn a character's parts from frames of its animation and check them on other frames.
+
+    Writes `NAME.blend` with the labelled character, `NAME.png` with all poses side by side and the model.
+
+    Returns
+    -------
+    dict
+        Poses with vertices and agreement, seconds a stage, mean agreement of the unseen poses, files.
+
+    Raises
+    ------
+    UserError
+        If the character has too few frames, or a file cannot be written.
+    """
+    if n_learned < 1 or n_unseen < 1:
+        raise UserError("The demo needs a pose to learn from and one to check on")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"{folder}: the folder could not be made: {error.strerror}") from error
+    report = Report([])
+    frames = reader.own_frames(context.scene, character, n_learned + n_unseen)
+    if len(frames) < n_learned + n_unseen:
+        raise UserError(f"{n_learned + n_unseen} poses are asked for, but the animation has only {len(frames)} frames")
+    learned = split(len(frames), n_learned)
+    with report.stage("read"):
+        poses = reader.read_frames(context, character, frames)
+    report.poses = poses
+    training = [pose for pose, known in zip(poses, learned, strict=True) if known]
+    others = [pose for pose, known in zip(poses, learned, strict=True) if not known]
+    model, described = tasks.learn(training, settings, report, lambda stage, done: progress(stage, 0.5 * done))
+    together = tasks.label(model, training, described, settings, report)
+    tasks.write(together, settings, report)
+
+    described += tasks.describe(model, others, report, lambda stage, done: progress(stage, 0.5 + 0.4 * done))
+    progress("Labels", 0.9)
+    labels_of = {
+        pose.name: tasks.label(model, [pose], [signature], settings, report)[character]
+        for pose, signature in zip(training + others, described, strict=True)
+    }
+    own = [labels_of[pose.name] for pose in poses]
+    agreement = agreements(own, learned, [polygon_areas(pose, len(own[0])) for pose in poses])
+
+    paths = {kind: folder / f"{character.name.lower()}{suffix}" for kind, suffix in SUFFIXES.items()}
+    progress("Picture", 0.95)
+    with report.stage("render"):
+        captions = [f"{frame} {'learned' if known else 'unseen'}" for frame, known in zip(frames, learned, strict=True)]
+        render_poses([Tile(*of_pose) for of_pose in zip(poses, own, captions, strict=True)], paths["picture"])
+    model.save(paths["model"])
+    settings.keep_model(model, f"{character.name}: {report.sentence}")
+    files.save_scene(paths["scene"])
+    return {
+        "poses": [
+            {"name": pose.name, "vertices": pose.mesh.n_vertices, "learned": known, "agreement": round(share, 4)}
+            for pose, known, share in zip(poses, learned, agreement, strict=True)
+        ],
+        "segments": report.n_segments,
+        "seconds": {name: round(seconds, 3) for name, seconds in report.seconds.items()},
+        "agreement": round(float(np.mean([a for a, known in zip(agreement, learned, strict=True) if not known])), 4),
+        "warnings": tasks.pose_warnings(poses, from_frames=True),
+        "files": {kind: str(path) for kind, path in paths.items()},
+    }
+
+
+def split(count: int, n_learned: int) -> list[bool]:
+    """For each of `count` poses in a row whether it is learned from; the unseen ones lie between them."""
+    chosen = set(reader.evenly(0, count - 1, n_learned))
+    return [i in chosen for i in range(count)]
+
+
+def polygon_areas(pose: reader.Pose, n_polygons: int) -> FloatArray:
+    """(p,) area of each polygon."""
+    return np.bincount(pose.polygon_of, weights=pose.mesh.face_areas, minlength=n_polygons)
+
+
+def agreements(labels: list[IntArray], learned: list[bool], areas: list[FloatArray]) -> list[float]:
+    """For each pose the share of its area whose label is the one that most learned poses give to the polygon."""
+    votes = np.zeros((len(labels[0]), 1 + max(int(of_pose.max()) for of_pose in labels)))
+    for of_pose, known in zip(labels, learned, strict=True):
+        if known:
+            votes[np.arange(len(of_pose)), of_pose] += 1
+    usual = votes.argmax(axis=1)
+    return [float(a @ (of_pose == usual) / a.sum()) for of_pose, a in zip(labels, areas, strict=True)]

@@ -1,0 +1,64 @@
+"""What an operator tells the user while it works and when it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import bpy
+
+from ..characters import mesh_objects
+from ..tasks import Progress, Report
+
+LOOK = "VERTEX"
+"""Color mode of solid shading that shows the color attribute."""
+
+
+@contextmanager
+def cursor_progress(context: bpy.types.Context) -> Iterator[Progress]:
+    """Show progress at the mouse pointer and in the status bar while the block lasts."""
+    manager, workspace = context.window_manager, context.workspace
+
+    def progress(stage: str, fraction: float) -> None:
+        manager.progress_update(round(100 * fraction))
+        if workspace is not None:
+            workspace.status_text_set(f"WKS Segment: {stage}")
+
+    manager.progress_begin(0, 100)
+    try:
+        yield progress
+    finally:
+        manager.progress_end()
+        if workspace is not None:
+            workspace.status_text_set(None)
+
+
+def finish(operator: bpy.types.Operator, verb: str, report: Report) -> set[str]:
+    """Report what was done, warnings last so that they stay in the status bar."""
+    operator.report({"INFO"}, f"{verb}: {report.sentence}")
+    for warning in report.warnings:
+        operator.report({"WARNING"}, warning)
+    return {"FINISHED"}
+
+
+def show_colors(context: bpy.types.Context) -> None:
+    """Let the 3D viewport that the user works in show the colors, if it is solid."""
+    space = context.space_data
+    if space is not None and space.type == "VIEW_3D" and space.shading.type == "SOLID":
+        space.shading.color_type = LOOK
+
+
+def in_object_mode(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """For `poll`: whether the mode is right; sets the message if not."""
+    if context.mode != "OBJECT":
+        cls.poll_message_set("Switch to Object Mode first")
+        return False
+    return True
+
+
+def has_selected_mesh(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """For `poll`: whether a mesh is selected; sets the message if not."""
+    if not mesh_objects(context.selected_objects):
+        cls.poll_message_set("Select the mesh of a character first")
+        return False
+    return True

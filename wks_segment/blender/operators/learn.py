@@ -1,0 +1,39 @@
+"""Learn and Segment."""
+
+from __future__ import annotations
+
+import bpy
+
+from .. import tasks
+from ..errors import UserError
+from . import feedback
+
+
+class WKS_SEGMENT_OT_learn(bpy.types.Operator):
+    """Learn the parts of a character from its poses, and color them"""
+
+    bl_idname = "wks_segment.learn"
+    bl_label = "Learn and Segment"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return feedback.in_object_mode(cls, context) and feedback.has_selected_mesh(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        settings = context.scene.wks_segment
+        report = tasks.Report([])
+        try:
+            with feedback.cursor_progress(context) as progress:
+                poses = tasks.read_training_poses(context, settings, report)
+                model, described = tasks.learn(poses, settings, report, progress)
+                labels = tasks.label(model, poses, described, settings, report)
+                tasks.write(labels, settings, report)
+        except UserError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        names = list(dict.fromkeys(pose.character.name for pose in poses))
+        settings.keep_model(model, f"{', '.join(names[:3])}{' …' * (len(names) > 3)}: {report.sentence}")
+        if settings.write_colors:
+            feedback.show_colors(context)
+        return feedback.finish(self, "Learned", report)

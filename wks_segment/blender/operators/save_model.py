@@ -1,0 +1,41 @@
+"""Save Model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+from bpy.props import StringProperty
+from bpy_extras.io_utils import ExportHelper
+
+from ...core import model_file
+from .. import tasks
+from ..errors import UserError
+
+
+class WKS_SEGMENT_OT_save_model(bpy.types.Operator, ExportHelper):
+    """Save the learned model to a file, for other scenes and for the command line"""
+
+    bl_idname = "wks_segment.save_model"
+    bl_label = "Save Model"
+
+    filename_ext = ".json"
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not context.scene.wks_segment.model:
+            cls.poll_message_set("No model yet: use Learn and Segment, or load a model")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        path = Path(bpy.path.abspath(self.filepath))
+        try:
+            tasks.stored_model(context.scene.wks_segment)
+            model_file.write(path, context.scene.wks_segment.model)
+        except (UserError, OSError) as error:
+            self.report({"ERROR"}, f"The model was not saved: {error}")
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"Saved the model to {path}")
+        return {"FINISHED"}

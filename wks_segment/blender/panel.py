@@ -1,0 +1,95 @@
+"""The panel in the sidebar of the 3D viewport."""
+
+from __future__ import annotations
+
+import bpy
+
+
+class WKS_SEGMENT_PT_main(bpy.types.Panel):
+    """Poses, segments and the three buttons."""
+
+    bl_label = "WKS Segment"
+    bl_idname = "WKS_SEGMENT_PT_main"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "WKS"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, settings = self.layout, context.scene.wks_segment
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+
+        column = layout.column()
+        column.prop(settings, "source")
+        if settings.source != "OBJECTS":
+            column.prop(settings, "pose_count")
+        if settings.source == "FRAMES":
+            column.prop(settings, "use_frame_range")
+            if settings.use_frame_range:
+                column.prop(settings, "frame_first")
+                column.prop(settings, "frame_last")
+        layout.prop(settings, "n_segments")
+
+        column = layout.column(align=True)
+        column.scale_y = 1.4
+        column.operator("wks_segment.learn", icon="MOD_EXPLODE")
+        column.operator("wks_segment.apply", icon="BRUSHES_ALL")
+        layout.operator("wks_segment.clear", icon="X")
+
+
+class WKS_SEGMENT_PT_outputs(bpy.types.Panel):
+    """What is written."""
+
+    bl_label = "Outputs"
+    bl_parent_id = "WKS_SEGMENT_PT_main"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, settings = self.layout, context.scene.wks_segment
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        column = layout.column(heading="Write")
+        column.prop(settings, "write_colors")
+        column.prop(settings, "write_materials")
+
+
+class WKS_SEGMENT_PT_model(bpy.types.Panel):
+    """The learned model."""
+
+    bl_label = "Model"
+    bl_parent_id = "WKS_SEGMENT_PT_main"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, settings = self.layout, context.scene.wks_segment
+        column = layout.column()
+        for line in (settings.model_summary or "No model yet: select a character, then Learn and Segment").split(": "):
+            column.label(text=line)
+        row = layout.row(align=True)
+        row.operator("wks_segment.load_model", text="Load", icon="IMPORT")
+        row.operator("wks_segment.save_model", text="Save", icon="EXPORT")
+
+
+class WKS_SEGMENT_PT_advanced(bpy.types.Panel):
+    """The settings of the paper."""
+
+    bl_label = "Advanced"
+    bl_parent_id = "WKS_SEGMENT_PT_main"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, settings = self.layout, context.scene.wks_segment
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        column = layout.column()
+        for name in ("random_state", "min_share", "n_eigenpairs", "n_energies", "covariance_type", "scaling"):
+            column.prop(settings, name)
+
+
+CLASSES = (WKS_SEGMENT_PT_main, WKS_SEGMENT_PT_outputs, WKS_SEGMENT_PT_model, WKS_SEGMENT_PT_advanced)

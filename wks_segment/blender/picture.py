@@ -1,0 +1,134 @@
+"""A picture of poses side by side, each polygon in the colour of its segment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from math import ceil
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+from ..core.mesh import FloatArray, IntArray
+from .errors import UserError
+from .palette import palette
+from .poses import Pose
+
+TILE = 480
+"""Width and height of a pose in the picture, in pixels."""
+COLUMNS = 4
+VIEW = Vector((-0.85, -1.0, 0.45))
+"""From where the camera looks: front left, a little from above, for a character that faces −Y."""
+MARGIN = 1.16
+"""Width and height of a tile, in those of the largest pose: leaves room for the caption."""
+CAPTION_SIZE = 0.05
+"""Height of the letters, in tiles."""
+COLORS = "color"
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One pose in the picture."""
+
+    pose: Pose
+    labels: IntArray
+    caption: str
+
+
+def render_poses(tiles: Sequence[Tile], path: Path, columns: int = COLUMNS) -> None:
+    """Render poses into one PNG file, `columns` in a row.
+
+    Uses a scene of its own, which is gone afterwards.
+
+    Raises
+    ------
+    UserError
+        If the picture cannot be rendered or written.
+    """
+    columns = min(columns, len(tiles))
+    rows = ceil(len(tiles) / columns)
+    towards = VIEW.normalized()
+    right = Vector((0, 0, 1)).cross(towards).normalized()
+    up = towards.cross(right)
+    axes = np.array([right, up, towards])
+    placed = [tile.pose.mesh.vertices @ axes.T for tile in tiles]
+    side = MARGIN * max(float(np.ptp(points[:, :2], axis=0).max()) for points in placed)
+    with _scene() as scene:
+        for i, (tile, points) in enumerate(zip(tiles, placed, strict=True)):
+            middle = (points.min(axis=0) + points.max(axis=0)) / 2
+            place = np.array([i % columns, -(i // columns), 0.0]) * side
+            _add_pose(scene, (points - middle + place) / side, tile)
+            _add_caption(scene, tile.caption, place / side)
+        _add_camera(scene, columns, rows)
+        _render(scene, path, columns, rows)
+
+
+@contextmanager
+def _scene() -> Iterator[bpy.types.Scene]:
+    """An empty scene that takes all that was added to it along when it goes."""
+    scene = bpy.data.scenes.new("WKS Segment picture")
+    try:
+        yield scene
+    finally:
+        for obj in list(scene.objects):
+            data = obj.data
+            bpy.data.objects.remove(obj)
+            bpy.data.batch_remove([data])
+        bpy.data.scenes.remove(scene)
+
+
+def _add_pose(scene: bpy.types.Scene, points: FloatArray, tile: Tile) -> None:
+    """The triangles of a pose in the camera's own axes: x to the right, y up, z towards it."""
+    mesh = bpy.data.meshes.new("pose")
+    faces = tile.pose.mesh.faces
+    mesh.from_pydata(points.tolist(), [], faces.tolist())
+    mesh.shade_smooth()
+    colors = np.ones((len(faces), 3, 4), dtype=np.float32)
+    colors[:, :, :3] = palette()[tile.labels[tile.pose.polygon_of]][:, None]
+    attribute = mesh.color_attributes.new(COLORS, "BYTE_COLOR", "CORNER")
+    attribute.data.foreach_set("color_srgb", colors.ravel())
+    mesh.color_attributes.active_color = attribute
+    scene.collection.objects.link(bpy.data.objects.new("pose", mesh))
+
+
+def _add_caption(scene: bpy.types.Scene, text: str, place: FloatArray) -> None:
+    curve = bpy.data.curves.new("caption", "FONT")
+    curve.body = text
+    curve.size = CAPTION_SIZE
+    curve.align_x = "CENTER"
+    caption = bpy.data.objects.new("caption", curve)
+    caption.location = (place[0], place[1] - 0.5 + CAPTION_SIZE / 2, 0.0)
+    scene.collection.objects.link(caption)
+
+
+def _add_camera(scene: bpy.types.Scene, columns: int, rows: int) -> None:
+    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    camera.data.type = "ORTHO"
+    camera.data.ortho_scale = max(columns, rows)
+    camera.data.clip_end = 100.0
+    camera.matrix_world = Matrix.Translation(((columns - 1) / 2, -(rows - 1) / 2, 10.0))
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+
+
+def _render(scene: bpy.types.Scene, path: Path, columns: int, rows: int) -> None:
+    scene.render.engine = "BLENDER_WORKBENCH"
+    scene.render.resolution_x, scene.render.resolution_y = TILE * columns, TILE * rows
+    scene.render.resolution_percentage = 100
+    scene.render.image_settings.file_format = "PNG"
+    scene.render.filepath = str(path.resolve())
+    scene.view_settings.view_transform = "Standard"
+    shading = scene.display.shading
+    shading.light, shading.color_type = "STUDIO", "VERTEX"
+    shading.show_cavity = True
+    shading.background_type, shading.background_color = "VIEWPORT", (0.93, 0.93, 0.94)
+    scene.world = None
+    try:
+        bpy.ops.render.render(write_still=True, scene=scene.name)
+    except RuntimeError as error:
+        raise UserError(f"The picture {path} could not be rendered: {error}") from error
+    if not path.is_file():
+        raise UserError(f"The picture {path} could not be written: is its folder there, and may you write to it?")

@@ -1,0 +1,199 @@
+"""Reads poses: the surface of a character as the artist sees it, and the way back to the artist's own polygons."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core import TriangleMesh
+from ..core.mesh import FloatArray, IntArray, repeats_a_vertex
+from .characters import Character
+from .errors import UserError
+
+ORIGIN = ".wks_segment_origin"
+"""Temporary face attribute: modifiers that make new faces copy it from the face that they make them of."""
+DEFORMING = frozenset({
+    "ARMATURE", "CAST", "CLOTH", "CORRECTIVE_SMOOTH", "CURVE", "DISPLACE", "HOOK", "LAPLACIANDEFORM", "LATTICE",
+    "MESH_CACHE", "MESH_DEFORM", "MESH_SEQUENCE_CACHE", "NORMAL_EDIT", "SHRINKWRAP", "SIMPLE_DEFORM", "SMOOTH",
+    "LAPLACIANSMOOTH", "SOFT_BODY", "SURFACE_DEFORM", "WARP", "WAVE", "WEIGHTED_NORMAL",
+})  # fmt: skip
+"""Modifiers that only move vertices: behind them a face is the face that it was."""
+SAME_SURFACE = 1e-5
+"""Two poses that differ by less than this fraction of the size are one and the same."""
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A character in one pose.
+
+    Attributes
+    ----------
+    name : str
+        As an artist would call it: the object, the frame, the shape key.
+    character : Character
+    mesh : TriangleMesh
+        All objects of the character as they are seen, in world space.
+    polygon_of : (m,) int array
+        The polygon that each triangle comes from; the polygons of all objects are numbered one object after another.
+    """
+
+    name: str
+    character: Character
+    mesh: TriangleMesh
+    polygon_of: IntArray
+
+    def is_like(self, other: Pose) -> bool:
+        """Whether the other pose is the same surface at the same place."""
+        a, b = self.mesh.vertices, other.mesh.vertices
+        return a.shape == b.shape and bool(np.abs(a - b).max() <= SAME_SURFACE * np.ptp(a, axis=0).max())
+
+
+def polygon_ranges(character: Character) -> list[tuple[bpy.types.Object, slice]]:
+    """Each object with its polygons' place in the character's numbering."""
+    ends = np.cumsum([len(obj.data.polygons) for obj in character.objects]).tolist()
+    starts = [0, *ends[:-1]]
+    return [(obj, slice(a, b)) for obj, a, b in zip(character.objects, starts, ends, strict=True)]
+
+
+def read_objects(context: bpy.types.Context, characters: Sequence[Character]) -> list[Pose]:
+    """Each character as it is now, one pose each."""
+    return [read_pose(context, character, character.name) for character in characters]
+
+
+def read_frames(context: bpy.types.Context, character: Character, frames: Sequence[int]) -> list[Pose]:
+    """One character at frames of its animation; the scene comes back to its own frame."""
+    scene = context.scene
+    before, subframe = scene.frame_current, scene.frame_subframe
+    try:
+        poses = []
+        for frame in frames:
+            scene.frame_set(frame)
+            poses.append(read_pose(context, character, f"{character.name}, frame {frame}"))
+        return poses
+    finally:
+        scene.frame_set(before, subframe=subframe)
+
+
+def read_shape_keys(context: bpy.types.Context, obj: bpy.types.Object, count: int) -> list[Pose]:
+    """One object in its shape keys, at most `count` of them, evenly chosen; each alone at its full value.
+
+    Raises
+    ------
+    UserError
+        If the object has no shape keys beside the basis.
+    """
+    keys = obj.data.shape_keys
+    if keys is None or len(keys.key_blocks) < 2:
+        raise UserError(f'"{obj.name}" has no shape keys: add some, or take the poses from elsewhere')
+    usable = [i for i, block in enumerate(keys.key_blocks) if not block.mute]
+    chosen = [usable[i] for i in evenly(0, len(usable) - 1, count)]
+    before, pinned = obj.active_shape_key_index, obj.show_only_shape_key
+    try:
+        poses = []
+        obj.show_only_shape_key = True
+        for index in chosen:
+            obj.active_shape_key_index = index
+            name = f"{obj.name}, {keys.key_blocks[index].name}"
+            poses.append(read_pose(context, Character((obj,)), name))
+        return poses
+    finally:
+        obj.active_shape_key_index, obj.show_only_shape_key = before, pinned
+
+
+def evenly(first: int, last: int, count: int) -> list[int]:
+    """At most `count` different whole numbers from first to last, in equal steps, both ends among them."""
+    return np.unique(np.linspace(first, last, max(count, 1)).round().astype(int)).tolist()
+
+
+def own_frames(scene: bpy.types.Scene, character: Character, count: int) -> list[int]:
+    """At most `count` frames spread over a character's own animation, or over the scene's range if it has none.
+
+    From the middles of equal spans, since the first and the last frame of a cycle are the same pose.
+    """
+    ranges = [tuple(action.frame_range) for action in character.actions] or [(scene.frame_start, scene.frame_end)]
+    first, last = min(first for first, _ in ranges), max(last for _, last in ranges)
+    middles = first + (np.arange(count) + 0.5) * (last - first) / count
+    return np.unique(middles.round().astype(int)).tolist()
+
+
+def read_pose(context: bpy.types.Context, character: Character, name: str) -> Pose:
+    """A character as it is seen now: modifiers, armature and shape keys applied, in world space.
+
+    Raises
+    ------
+    UserError
+        If an object has no faces, a modifier hides where its faces come from, or a coordinate is not finite.
+    """
+    vertices: list[FloatArray] = []
+    triangles: list[IntArray] = []
+    owners: list[IntArray] = []
+    n_vertices = 0
+    with _marked_origins(context, character):
+        depsgraph = context.evaluated_depsgraph_get()
+        for obj, polygons in polygon_ranges(character):
+            points, faces, polygon_of = _read_object(obj, depsgraph)
+            vertices.append(points)
+            triangles.append(faces + n_vertices)
+            owners.append(polygon_of + polygons.start)
+            n_vertices += len(points)
+    faces = np.concatenate(triangles)
+    if not len(faces):
+        names = ", ".join(f'"{obj.name}"' for obj in character.objects)
+        raise UserError(f"{names} has no faces: there is no surface to find parts on")
+    proper = ~repeats_a_vertex(faces)
+    try:
+        mesh = TriangleMesh(np.concatenate(vertices), faces[proper])
+    except ValueError as error:
+        raise UserError(f'"{name}": {error}') from error
+    return Pose(name, character, mesh, np.concatenate(owners)[proper])
+
+
+def _read_object(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[FloatArray, IntArray, IntArray]:
+    """Vertices in world space, triangles, and the polygon of the object's own mesh that each comes from."""
+    evaluated = obj.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        mesh.calc_loop_triangles()
+        vertices = _get(mesh.vertices, "co", 3, np.float32).reshape(-1, 3)
+        triangles = _get(mesh.loop_triangles, "vertices", 3, np.int32).reshape(-1, 3)
+        polygon_of = _get(mesh.loop_triangles, "polygon_index", 1, np.int32)
+        origin = mesh.attributes.get(ORIGIN)
+        if origin is not None:
+            polygon_of = _get(origin.data, "value", 1, np.int32)[polygon_of]
+        elif len(mesh.polygons) != len(obj.data.polygons):
+            raise UserError(
+                f'"{obj.name}": a modifier makes faces without a trace of origin (as Remesh): apply it, or turn it off'
+            )
+        world = np.array(evaluated.matrix_world, dtype=np.float64)
+    finally:
+        evaluated.to_mesh_clear()
+    return vertices @ world[:3, :3].T + world[:3, 3], triangles.astype(np.int64), polygon_of.astype(np.int64)
+
+
+def _get(collection: bpy.types.bpy_prop_collection, name: str, width: int, dtype: type) -> NDArray[Any]:
+    values = np.empty(len(collection) * width, dtype=dtype)
+    collection.foreach_get(name, values)
+    return values
+
+
+@contextmanager
+def _marked_origins(context: bpy.types.Context, character: Character) -> Iterator[None]:
+    """While it lasts, objects whose modifiers may make faces carry the number of each face as an attribute."""
+    meshes = {obj.data for obj in character.objects if any(m.type not in DEFORMING for m in obj.modifiers)}
+    try:
+        for mesh in meshes:
+            origin = mesh.attributes.new(ORIGIN, "INT", "FACE")
+            origin.data.foreach_set("value", np.arange(len(mesh.polygons), dtype=np.int32))
+            mesh.update_tag()
+        yield
+    finally:
+        for mesh in meshes:
+            origin = mesh.attributes.get(ORIGIN)
+            if origin is not None:
+                mesh.attributes.remove(origin)

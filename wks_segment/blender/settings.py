@@ -1,0 +1,110 @@
+"""The settings, described once: panel, operators and command line all use this property group."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+
+from ..core import PoseSegmentation
+from .palette import MAX_COLOURS
+
+MODEL_PARAMETERS = (
+    "n_segments", "n_eigenpairs", "n_energies", "covariance_type", "scaling", "random_state",
+)  # fmt: skip
+
+
+class WKSSegmentSettings(bpy.types.PropertyGroup):
+    """Settings and the learned model, kept with the scene."""
+
+    source: EnumProperty(
+        name="Poses",
+        description="Where the poses to learn from are",
+        items=[
+            (
+                "OBJECTS",
+                "Selected Objects",
+                "Each selected mesh object is a pose. Objects on one armature are one pose",
+            ),
+            ("FRAMES", "Animation Frames", "Frames of the selected character's animation"),
+            ("SHAPE_KEYS", "Shape Keys", "Shape keys of the active object, each at its full value"),
+        ],
+        default="FRAMES",
+    )
+    pose_count: IntProperty(
+        name="Count",
+        description="How many frames or shape keys to take, in equal steps. Three to five are enough for most",
+        default=5, min=1, max=100, soft_max=12,
+    )  # fmt: skip
+    use_frame_range: BoolProperty(
+        name="Frame Range",
+        description="Take the poses from a range of frames instead of the whole action or scene",
+    )
+    frame_first: IntProperty(name="First", description="First frame to take a pose from", default=1)
+    frame_last: IntProperty(name="Last", description="Last frame to take a pose from", default=50)
+
+    n_segments: IntProperty(
+        name="Segments",
+        description="Number of kinds of parts. Parts that look alike, as both hands, are one kind",
+        default=8, min=2, max=MAX_COLOURS, soft_max=20,
+    )  # fmt: skip
+    random_state: IntProperty(
+        name="Seed", description="The same seed gives the same parts; another one may find others", default=0, min=0
+    )
+    n_eigenpairs: IntProperty(
+        name="Eigenpairs",
+        description="How much detail the signature sees. Fewer are faster and coarser",
+        default=300, min=20, max=1000, soft_min=50, soft_max=500,
+    )  # fmt: skip
+    n_energies: IntProperty(
+        name="Energies", description="Length of the signature of a vertex", default=100, min=10, max=500, soft_max=200
+    )
+    covariance_type: EnumProperty(
+        name="Covariance",
+        description="What shape the mixture gives to a kind of part",
+        items=[
+            ("auto", "Automatic", "What generalises best to unseen poses"),
+            ("shared", "Shared", "One diagonal covariance for all segments, the most robust"),
+            ("diag", "Diagonal", "A diagonal covariance for each segment"),
+            ("spherical", "Spherical", "One variance for each segment"),
+            ("tied", "Tied", "One full covariance for all segments"),
+            ("full", "Full", "A full covariance for each segment, learns by heart with few poses"),
+        ],
+        default="auto",
+    )
+    scaling: EnumProperty(
+        name="Scaling",
+        description="What enters the mixture",
+        items=[
+            ("log", "Logarithm", "Limbs and torso count as much as fingers and toes"),
+            ("raw", "As in the Paper", "The signature itself; the finest parts dominate"),
+        ],
+        default="log",
+    )
+    min_share: FloatProperty(
+        name="Smallest Part",
+        description="A connected part below this share of the surface joins its neighbour",
+        default=0.5, min=0.0, max=20.0, precision=1, subtype="PERCENTAGE",
+    )  # fmt: skip
+
+    write_colors: BoolProperty(
+        name="Colors", description="Write a color attribute, one flat color a face, and show it", default=True
+    )
+    write_materials: BoolProperty(
+        name="Materials",
+        description="Add a material slot for each segment. The object's own materials come back with Clear",
+        default=False,
+    )
+
+    model: StringProperty(options={"HIDDEN"}, description="The learned model, as JSON")
+    model_summary: StringProperty(options={"HIDDEN"}, description="What the model was learned from")
+
+    def new_model(self) -> PoseSegmentation:
+        """An unfitted model with these settings."""
+        parameters: dict[str, Any] = {name: getattr(self, name) for name in MODEL_PARAMETERS}
+        return PoseSegmentation(**parameters)
+
+    def keep_model(self, model: PoseSegmentation, summary: str) -> None:
+        """Store a fitted model in the scene."""
+        self.model, self.model_summary = model.to_json(), summary

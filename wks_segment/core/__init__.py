@@ -1,0 +1,27 @@
+"""The method, without Blender: mesh → surface → laplacian → spectrum → signature → mixture → segmentation → regions."""
+
+from .laplacian import mass_matrix, stiffness_matrix
+from .mesh import TriangleMesh
+from .mixture import GaussianMixture, fit_mixture
+from .model_file import ModelFileError
+from .segmentation import PoseSegmentation, PoseSignature
+from .signature import heat_kernel_signature, wave_kernel_signature
+from .spectrum import SpectrumError, eigenpairs
+from .surface import Surface, prepare_surface
+
+__all__ = [
+    "GaussianMixture",
+    "ModelFileError",
+    "PoseSegmentation",
+    "PoseSignature",
+    "SpectrumError",
+    "Surface",
+    "TriangleMesh",
+    "eigenpairs",
+    "fit_mixture",
+    "heat_kernel_signature",
+    "mass_matrix",
+    "prepare_surface",
+    "stiffness_matrix",
+    "wave_kernel_signature",
+]

@@ -1,0 +1,108 @@
+"""A triangle mesh that was checked once, so that everything behind it can trust it."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+
+class TriangleMesh:
+    """Vertices and triangles, validated and read-only.
+
+    Parameters
+    ----------
+    vertices : (n, 3) array of float
+        Positions, in any unit.
+    faces : (m, 3) array of int
+        Vertex indices of each triangle, in either orientation.
+
+    Raises
+    ------
+    ValueError
+        If an array has the wrong shape, a coordinate is not finite, an index points nowhere, a face uses a vertex
+        twice, there is no face, or the whole surface has no area. The message says which one and where.
+    """
+
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
+        self.vertices: FloatArray = _checked_vertices(vertices)
+        self.faces: IntArray = _checked_faces(faces, len(self.vertices))
+        if not self.area > 0:
+            raise ValueError("the mesh has no area: all its faces are points or lines; check the scale of the mesh")
+        self.vertices.setflags(write=False)
+        self.faces.setflags(write=False)
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices."""
+        return len(self.vertices)
+
+    @property
+    def n_faces(self) -> int:
+        """Number of triangles."""
+        return len(self.faces)
+
+    @cached_property
+    def face_areas(self) -> FloatArray:
+        """(m,) area of each triangle, in squared units of the vertices."""
+        a, b, c = (self.vertices[self.faces[:, i]] for i in range(3))
+        return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
+
+    @property
+    def area(self) -> float:
+        """Area of the surface, in squared units of the vertices."""
+        return float(self.face_areas.sum())
+
+    @cached_property
+    def vertex_areas(self) -> FloatArray:
+        """(n,) a third of the area of the triangles around each vertex (barycentric lumping)."""
+        thirds = np.repeat(self.face_areas / 3, 3)
+        return np.bincount(self.faces.ravel(), weights=thirds, minlength=self.n_vertices).astype(np.float64)
+
+    def __repr__(self) -> str:
+        return f"TriangleMesh({self.n_vertices} vertices, {self.n_faces} faces)"
+
+
+def _checked_vertices(vertices: ArrayLike) -> FloatArray:
+    array = np.array(vertices, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(f"vertices must have the shape (n, 3), not {array.shape}")
+    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    if bad.size:
+        raise ValueError(
+            f"vertex {bad[0]} has a coordinate that is not finite: {array[bad[0]].tolist()} "
+            f"({bad.size} such vertices in all)"
+        )
+    return array
+
+
+def _checked_faces(faces: ArrayLike, n_vertices: int) -> IntArray:
+    array = np.array(faces)
+    if array.size == 0:
+        raise ValueError("the mesh has no faces")
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(f"faces must have the shape (m, 3), not {array.shape}; triangulate the mesh first")
+    if not np.issubdtype(array.dtype, np.integer):
+        raise ValueError(f"faces must be integers (indices of vertices), not {array.dtype}")
+    array = array.astype(np.int64)
+    bad = np.flatnonzero(((array < 0) | (array >= n_vertices)).any(axis=1))
+    if bad.size:
+        raise ValueError(
+            f"face {bad[0]} points to a vertex that does not exist: {array[bad[0]].tolist()}, "
+            f"the mesh has {n_vertices} vertices ({bad.size} such faces in all)"
+        )
+    bad = np.flatnonzero(repeats_a_vertex(array))
+    if bad.size:
+        raise ValueError(f"face {bad[0]} uses a vertex twice: {array[bad[0]].tolist()} ({bad.size} such faces in all)")
+    return array
+
+
+def repeats_a_vertex(faces: IntArray) -> BoolArray:
+    """(m,) whether a triangle names one vertex more than once, and so is no triangle."""
+    a, b, c = faces.T
+    return np.asarray((a == b) | (b == c) | (c == a))

@@ -1,0 +1,194 @@
+"""A Gaussian mixture over weighted samples, fitted by expectation–maximisation that cannot collapse.
+
+scikit-learn's mixture takes no sample weights and has no covariance that all components share and that is diagonal,
+which is the paper's remedy against over-fitting; hence our own. Its k-means starts it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.special import logsumexp
+from sklearn.cluster import KMeans
+
+from .mesh import FloatArray
+
+CovarianceType = Literal["shared", "diag", "full", "tied", "spherical"]
+
+VARIANCE_FLOOR = 1e-3
+"""Added to every variance, as a fraction of the samples' own mean variance."""
+MAX_ITERATIONS = 200
+TOLERANCE = 1e-4
+"""EM ends when the mean log-likelihood rises by less than this in one round."""
+STARTS = 10
+"""EM is started this often by k-means, on a sketch of the samples; the likeliest mixture is refined on all of them."""
+SKETCH = 4_000
+"""Samples in the sketch."""
+ROWS = 65_536
+"""Samples in one block of the likelihood."""
+
+
+@dataclass(frozen=True)
+class GaussianMixture:
+    """K Gaussians with weights.
+
+    Attributes
+    ----------
+    covariance_type : str
+        "shared" (one diagonal for all), "diag", "spherical" (one number a component), "tied" (one full matrix for
+        all), "full".
+    weights : (K,) array
+        Sum to 1.
+    means : (K, d) array
+    covariances : array
+        (d,) for "shared", (K, d) for "diag", (K,) for "spherical", (d, d) for "tied", (K, d, d) for "full".
+    """
+
+    covariance_type: CovarianceType
+    weights: FloatArray
+    means: FloatArray
+    covariances: FloatArray
+
+    def log_densities(self, samples: FloatArray) -> FloatArray:
+        """(n, K) log of weight times density of each component at (n, d) samples."""
+        blocks = [
+            _log_gaussians(samples[start : start + ROWS], self.means, self.covariances, self.covariance_type)
+            for start in range(0, max(len(samples), 1), ROWS)
+        ]
+        return np.concatenate(blocks) + np.log(self.weights)
+
+    def posteriors(self, samples: FloatArray) -> FloatArray:
+        """(n, K) probability of each component given each of the (n, d) samples; rows sum to 1."""
+        logs = self.log_densities(samples)
+        return np.asarray(np.exp(logs - logsumexp(logs, axis=1, keepdims=True)))
+
+    def log_likelihoods(self, samples: FloatArray) -> FloatArray:
+        """(n,) log density of the whole mixture at (n, d) samples."""
+        return np.asarray(logsumexp(self.log_densities(samples), axis=1))
+
+
+def fit_mixture(
+    samples: FloatArray,
+    sample_weights: FloatArray,
+    n_components: int,
+    covariance_type: CovarianceType = "shared",
+    random_state: int = 0,
+) -> GaussianMixture:
+    """Fit a mixture to weighted samples by expectation–maximisation, started by k-means.
+
+    Parameters
+    ----------
+    samples : (n, d) array
+    sample_weights : (n,) array
+        Positive; only their ratios count.
+    n_components : int
+        K. Components come out in the order of the mean of their means, largest first, so that the order does not
+        depend on the start.
+    covariance_type
+        See `GaussianMixture`.
+    random_state : int
+        Seed of k-means.
+
+    Raises
+    ------
+    ValueError
+        If the covariance type is unknown or there are fewer different samples than components.
+    """
+    if covariance_type not in get_args(CovarianceType):
+        raise ValueError(f"covariance_type must be one of {get_args(CovarianceType)}, not {covariance_type!r}")
+    shares = sample_weights / sample_weights.sum()
+    generator = np.random.default_rng(random_state)
+    sketch, sketch_shares = samples, shares
+    if len(samples) > SKETCH:
+        sketch = samples[generator.choice(len(samples), SKETCH, p=shares)]
+        sketch_shares = np.full(SKETCH, 1 / SKETCH)
+    mean = shares @ samples
+    floor = VARIANCE_FLOOR * float(shares @ ((samples - mean) ** 2).mean(axis=1))
+    candidates = []
+    for seed in generator.integers(2**31, size=STARTS):
+        start = KMeans(n_components, n_init=1, random_state=int(seed)).fit_predict(sketch, sample_weight=sketch_shares)
+        if len(np.unique(start)) < n_components:
+            raise ValueError(
+                f"{n_components} components are too many: the samples have only {len(np.unique(start))} distinct values"
+            )
+        candidates.append(_maximise_likelihood(sketch, sketch_shares, np.eye(n_components)[start], covariance_type, floor))
+    best = max(candidates, key=lambda candidate: candidate[1])[0]
+    return _in_order(_maximise_likelihood(samples, shares, best.posteriors(samples), covariance_type, floor)[0])
+
+
+def _maximise_likelihood(
+    samples: FloatArray, shares: FloatArray, start: FloatArray, covariance_type: CovarianceType, floor: float
+) -> tuple[GaussianMixture, float]:
+    """EM from (n, K) responsibilities; the mixture and its mean log-likelihood."""
+    responsibilities, previous = start, -np.inf
+    for _ in range(MAX_ITERATIONS):
+        mixture = _maximise(samples, responsibilities * shares[:, None], covariance_type, floor)
+        logs = mixture.log_densities(samples)
+        likelihoods = logsumexp(logs, axis=1)
+        responsibilities = np.exp(logs - likelihoods[:, None])
+        current = float(shares @ likelihoods)
+        if current - previous < TOLERANCE:
+            break
+        previous = current
+    return mixture, current
+
+
+def _maximise(
+    samples: FloatArray, masses: FloatArray, covariance_type: CovarianceType, floor: float
+) -> GaussianMixture:
+    """M-step for (n, K) masses that sum to 1, with `floor` added to each variance."""
+    # An empty component keeps a vanishing weight instead of dividing by zero.
+    weights = masses.sum(axis=0) + 10 * np.finfo(float).tiny ** 0.5
+    means = masses.T @ samples / weights[:, None]
+    covariances: FloatArray
+    if covariance_type in ("full", "tied"):
+        centred = [samples - mean for mean in means]
+        scatter = np.stack([(x * mass[:, None]).T @ x for x, mass in zip(centred, masses.T, strict=True)])
+        covariances = scatter.sum(axis=0) if covariance_type == "tied" else scatter / weights[:, None, None]
+        covariances = covariances + floor * np.eye(samples.shape[1])
+    else:
+        scatter = np.stack([mass @ (samples - mean) ** 2 for mass, mean in zip(masses.T, means, strict=True)])
+        if covariance_type == "shared":
+            covariances = scatter.sum(axis=0) + floor
+        else:
+            covariances = scatter / weights[:, None] + floor
+            if covariance_type == "spherical":
+                covariances = covariances.mean(axis=1)
+    return GaussianMixture(covariance_type, weights / weights.sum(), means, covariances)
+
+
+def _log_gaussians(
+    samples: FloatArray, means: FloatArray, covariances: FloatArray, covariance_type: CovarianceType
+) -> FloatArray:
+    """(n, K) log densities, without the weights."""
+    n_components, dimension = means.shape
+    if covariance_type in ("full", "tied"):
+        matrices = np.broadcast_to(covariances, (n_components, dimension, dimension))
+        factors = np.linalg.cholesky(matrices)
+        half_log_determinants = np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
+        distances = np.stack(
+            [
+                (solve_triangular(factor, (samples - mean).T, lower=True) ** 2).sum(axis=0)
+                for factor, mean in zip(factors, means, strict=True)
+            ],
+            axis=1,
+        )
+    else:
+        variances = covariances[:, None] if covariance_type == "spherical" else covariances
+        variances = np.broadcast_to(variances, means.shape)
+        half_log_determinants = np.log(variances).sum(axis=1) / 2
+        # Σ (x − μ)² / v, multiplied out so that it is two matrix products. Centred first, against cancellation.
+        centre = means.mean(axis=0)
+        x, mu = samples - centre, means - centre
+        distances = x**2 @ (1 / variances).T - 2 * x @ (mu / variances).T + (mu**2 / variances).sum(axis=1)
+    return np.asarray(-distances / 2 - half_log_determinants - dimension * np.log(2 * np.pi) / 2)
+
+
+def _in_order(mixture: GaussianMixture) -> GaussianMixture:
+    order = np.argsort(-mixture.means.mean(axis=1), kind="stable")
+    per_component = mixture.covariance_type in ("diag", "spherical", "full")
+    covariances = mixture.covariances[order] if per_component else mixture.covariances
+    return GaussianMixture(mixture.covariance_type, mixture.weights[order], mixture.means[order], covariances)

@@ -1,0 +1,117 @@
+"""Models as JSON: data only, readable by a person, the same bytes on every machine."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from os import PathLike
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from .mesh import FloatArray
+from .mixture import CovarianceType
+
+FORMAT = "wks_segment model"
+VERSION = 1
+PARAMETERS = (
+    "n_segments", "covariance_type", "n_eigenpairs", "n_energies", "accuracy", "random_state", "scaling",
+)  # fmt: skip
+MAX_BYTES = 256 * 2**20
+"""A file above this is no model: 64 segments with full covariances of 200 energies take 60 MB."""
+
+
+class ModelFileError(ValueError):
+    """The file or text is not a model that this version can read; the message says why."""
+
+
+def encode(parameters: dict[str, Any], arrays: dict[str, FloatArray], covariance_type: CovarianceType) -> str:
+    """JSON text of a model."""
+    content = {
+        "format": FORMAT,
+        "version": VERSION,
+        "parameters": parameters,
+        "mixture_covariance_type": covariance_type,
+        **{name: array.tolist() for name, array in arrays.items()},
+    }
+    return json.dumps(content, default=_plain, allow_nan=False)
+
+
+def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], CovarianceType]:
+    """Parameters, arrays and covariance type of a model, all checked; ModelFileError if anything is off."""
+    try:
+        content = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ModelFileError(f"this is not a model of WKS Segment: it is no JSON ({error})") from error
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise ModelFileError("this is not a model of WKS Segment")
+    if content.get("version") != VERSION:
+        raise ModelFileError(
+            f"the model has version {content.get('version')!r}, this program reads {VERSION}: update WKS Segment"
+        )
+    parameters = content.get("parameters")
+    if not isinstance(parameters, dict) or set(parameters) != set(PARAMETERS):
+        raise ModelFileError(f"the model is damaged: its parameters are not {', '.join(PARAMETERS)}")
+    covariance_type: CovarianceType = content.get("mixture_covariance_type")  # type: ignore[assignment]  # checked below
+    k, d = parameters["n_segments"], parameters["n_energies"]
+    shapes = {"shared": (d,), "diag": (k, d), "spherical": (k,), "tied": (d, d), "full": (k, d, d)}
+    if covariance_type not in get_args(CovarianceType):
+        raise ModelFileError(f"the model is damaged: unknown covariance type {covariance_type!r}")
+    arrays = {
+        name: _array(content, name, shape)
+        for name, shape in {
+            "centre": (d,), "spread": (d,), "weights": (k,), "means": (k, d), "covariances": shapes[covariance_type],
+        }.items()
+    }  # fmt: skip
+    if covariance_type in ("tied", "full"):
+        positive = bool((np.linalg.eigvalsh(arrays["covariances"]) > 0).all())
+    else:
+        positive = bool((arrays["covariances"] > 0).all())
+    if not (positive and (arrays["spread"] > 0).all() and (arrays["weights"] > 0).all()):
+        raise ModelFileError("the model is damaged: a variance or a weight is not positive")
+    return parameters, arrays, covariance_type
+
+
+def write(path: str | PathLike[str], text: str) -> None:
+    """Write text to a file so that a failure half-way leaves an older file as it was."""
+    target = Path(path)
+    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        os.replace(temporary, target)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def read(path: str | PathLike[str]) -> str:
+    """Text of a model file; ModelFileError if it is too large or no text."""
+    size = Path(path).stat().st_size
+    if size > MAX_BYTES:
+        raise ModelFileError(f"{path}: {size / 2**20:.0f} MB is too large for a model")
+    try:
+        return Path(path).read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise ModelFileError(f"{path}: this is not a model of WKS Segment, but a binary file") from error
+
+
+def _array(content: dict[str, Any], name: str, shape: tuple[int, ...]) -> FloatArray:
+    try:
+        array = np.array(content[name], dtype=np.float64)
+    except (KeyError, ValueError, TypeError) as error:
+        raise ModelFileError(f"the model is damaged: {name} is missing or not numbers") from error
+    if array.shape != shape:
+        raise ModelFileError(f"the model is damaged: {name} has the shape {array.shape}, not {shape}")
+    if not np.isfinite(array).all():
+        raise ModelFileError(f"the model is damaged: {name} has a number that is not finite")
+    return array
+
+
+def _plain(value: object) -> object:
+    """NumPy's numbers as Python's own."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"{type(value).__name__} cannot be written to a model")

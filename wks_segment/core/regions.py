@@ -1,0 +1,154 @@
+"""From posteriors to clean parts: connected regions of faces with smooth borders and no crumbs."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix, csc_matrix, diags
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
+from scipy.spatial import cKDTree
+
+from .laplacian import stiffness_matrix, unit_area_masses
+from .mesh import BoolArray, FloatArray, IntArray, TriangleMesh
+
+
+@dataclass(frozen=True)
+class FaceAdjacency:
+    """Which faces share an edge.
+
+    Attributes
+    ----------
+    pairs : (p, 2) int array
+        Faces on the two sides of an edge. Where more than two faces meet, they form a chain.
+    lengths : (p,) array
+        Length of that edge.
+    """
+
+    pairs: IntArray
+    lengths: FloatArray
+
+    @classmethod
+    def of(cls, faces: IntArray, vertices: FloatArray) -> FaceAdjacency:
+        """Find the neighbours of (m, 3) faces with corners in (n, 3) vertices."""
+        edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        order = np.lexsort((edges[:, 1], edges[:, 0]))
+        edges, owner = edges[order], order // 3
+        same = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
+        lengths = np.linalg.norm(vertices[edges[same, 0]] - vertices[edges[same, 1]], axis=1)
+        return cls(np.stack([owner[same], owner[same + 1]], axis=1), lengths)
+
+    def between_polygons(self, polygon_of: IntArray) -> FaceAdjacency:
+        """The same borders between polygons, given the polygon of each face; those inside a polygon drop out."""
+        pairs = polygon_of[self.pairs]
+        across = pairs[:, 0] != pairs[:, 1]
+        return FaceAdjacency(pairs[across], self.lengths[across])
+
+
+def smooth_posteriors(mesh: TriangleMesh, posteriors: FloatArray, length: float) -> FloatArray:
+    """Average (n, K) posteriors over the surface within about `length` (in units of the square root of its area).
+
+    One implicit step of heat flow, (M + t S) p' = M p with t = length²: the same on any meshing.
+    """
+    masses = unit_area_masses(mesh)
+    system = csc_matrix(diags(masses) + length**2 * stiffness_matrix(mesh))
+    factor = splu(system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    return np.asarray(factor.solve(masses[:, None] * posteriors))
+
+
+def connected_regions(labels: IntArray, adjacency: FaceAdjacency) -> IntArray:
+    """(m,) connected part of each face: faces of one label that hang together by edges, numbered 0, 1, …
+
+    Numbered by label first, within a label by the lowest face.
+    """
+    inside = adjacency.pairs[labels[adjacency.pairs[:, 0]] == labels[adjacency.pairs[:, 1]]]
+    graph = coo_matrix((np.ones(len(inside)), (inside[:, 0], inside[:, 1])), shape=(len(labels),) * 2)
+    part = connected_components(graph, directed=False)[1]
+    first = np.unique(part, return_index=True)[1]
+    rank = np.empty(len(first), dtype=np.int64)
+    rank[np.lexsort((first, labels[first]))] = np.arange(len(first))
+    return rank[part]
+
+
+def merge_crumbs(
+    labels: IntArray, areas: FloatArray, centres: FloatArray, adjacency: FaceAdjacency, min_share: float
+) -> IntArray:
+    """Give every connected region under a share of the area the label of a neighbour.
+
+    The smallest goes first, to the neighbour with which it shares most border. A loose piece that is too small as a
+    whole takes the label of the face nearest to it that belongs to a large enough region, as an eye does that of its
+    head.
+
+    Parameters
+    ----------
+    labels : (m,) int array
+    areas : (m,) array
+    centres : (m, 3) array
+    adjacency : FaceAdjacency
+    min_share : float
+        Between 0 and 1.
+
+    Returns
+    -------
+    (m,) int array of labels.
+    """
+    region = connected_regions(labels, adjacency)
+    count = region.max() + 1
+    size = np.bincount(region, weights=areas, minlength=count)
+    label_of = np.zeros(count, dtype=np.int64)
+    label_of[region] = labels
+    least = min_share * areas.sum()
+
+    borders = _border_lengths(region, adjacency)
+    owner = np.arange(count)
+
+    def root(i: int) -> int:
+        while owner[i] != i:
+            owner[i] = owner[owner[i]]
+            i = int(owner[i])
+        return i
+
+    for crumb in np.argsort(size, kind="stable"):
+        # A crumb may have grown by smaller ones before its turn.
+        if owner[crumb] != crumb or size[crumb] >= least:
+            continue
+        shared: dict[int, float] = defaultdict(float)
+        for neighbour, length in borders[crumb].items():
+            shared[root(neighbour)] += length
+        shared.pop(int(crumb), None)
+        if not shared:
+            continue
+        target = max(shared, key=lambda i: (shared[i], -i))
+        # Neighbours of the crumb's label are one region with it only from now on, and keep their own borders.
+        owner[crumb] = target
+        size[target] += size[crumb]
+        for neighbour, length in borders.pop(int(crumb)).items():
+            borders[target][neighbour] = borders[target].get(neighbour, 0.0) + length
+    owner = np.array([root(i) for i in range(count)])
+    merged = label_of[owner][region]
+    return _adopt_loose_pieces(merged, size[owner][region] < least, centres)
+
+
+def _border_lengths(region: IntArray, adjacency: FaceAdjacency) -> dict[int, dict[int, float]]:
+    """For each region the length of border that it shares with each neighbour."""
+    a, b = region[adjacency.pairs].T
+    across = a != b
+    shape = (int(region.max()) + 1,) * 2
+    half = coo_matrix((adjacency.lengths[across], (a[across], b[across])), shape=shape).tocsr()
+    full = (half + half.T).tocoo()
+    borders: dict[int, dict[int, float]] = {i: {} for i in range(shape[0])}
+    for i, j, length in zip(full.row.tolist(), full.col.tolist(), full.data.tolist(), strict=True):
+        borders[i][j] = length
+    return borders
+
+
+def _adopt_loose_pieces(labels: IntArray, loose: BoolArray, centres: FloatArray) -> IntArray:
+    """Give faces of loose, small pieces the label of the nearest face of a region that is large enough."""
+    if not loose.any() or loose.all():
+        return labels
+    labels = labels.copy()
+    nearest = cKDTree(centres[~loose]).query(centres[loose])[1]
+    labels[loose] = labels[~loose][nearest]
+    return labels

@@ -1,0 +1,343 @@
+"""Parts that are the same in every pose: one Gaussian mixture over the signatures of several poses.
+
+Aubry, Schlickewei and Cremers, "Pose-consistent 3D shape segmentation based on a quantum mechanical feature
+descriptor" (2011).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from typing import Literal, get_args
+
+import numpy as np
+
+from . import model_file
+from .laplacian import unit_area_masses
+from .mesh import FloatArray, IntArray, TriangleMesh
+from .mixture import CovarianceType, GaussianMixture, fit_mixture
+from .regions import FaceAdjacency, connected_regions, merge_crumbs, smooth_posteriors
+from .signature import wave_kernel_signature
+from .spectrum import Accuracy, eigenpairs
+from .surface import Surface, indicator, prepare_surface
+
+Scaling = Literal["log", "raw"]
+Progress = Callable[[str, float], None]
+"""Called with the stage and the fraction of the whole that is done, 0 to 1."""
+
+VERTICES_PER_PAIR = 10
+"""A surface is refined until it has this many vertices for each eigenpair: about five to the shortest wavelength."""
+SIGNATURE_OFFSET = 0.01
+"""Added to the signature, whose mean is 1, before its logarithm: tiny loose parts take no part in low energies."""
+MAX_SAMPLES = 20_000
+"""Vertices that take part in the mixture, drawn by area where there are more."""
+MIN_SHARE = 0.005
+"""Smallest part, as a share of the area."""
+SMOOTHING_LENGTH = 0.03
+"""Width of the smoothing along borders, in units of the square root of the area."""
+
+
+@dataclass(frozen=True)
+class PoseSignature:
+    """One pose, described: what takes the time, to be computed once and used for learning and labelling.
+
+    Attributes
+    ----------
+    surface : Surface
+        The welded and refined surface, with n' vertices.
+    signature : (n', n_energies) array of float
+    """
+
+    surface: Surface
+    signature: FloatArray
+
+
+class PoseSegmentation:
+    """Learns a character's parts from several poses and finds them in any pose.
+
+    Parameters
+    ----------
+    n_segments : int
+        Components of the mixture. One component can be several connected parts, as both hands.
+    covariance_type : "auto", "shared", "diag", "full", "tied" or "spherical"
+        "shared" is one diagonal covariance for all components, the paper's remark and the most robust on poses and
+        people that were not learned from; "auto" takes it.
+    n_eigenpairs : int
+        Eigenpairs of each pose, without the zero modes of further components.
+    n_energies : int
+        Length of the signature.
+    accuracy : "fast" or "exact"
+        See `eigenpairs`.
+    random_state : int
+        Seed; the same input and seed give the same model.
+    scaling : "log" or "raw"
+        What enters the mixture: the logarithm of the signature, so that fine parts do not outweigh limbs, or the
+        signature as the paper has it.
+
+    Attributes
+    ----------
+    mixture_ : GaussianMixture
+        In the space of centred and scaled signatures.
+    centre_, spread_ : (n_energies,) arrays
+        Mean and standard deviation of the training signatures over the area.
+    """
+
+    def __init__(
+        self,
+        n_segments: int = 8,
+        covariance_type: Literal["auto"] | CovarianceType = "auto",
+        n_eigenpairs: int = 300,
+        n_energies: int = 100,
+        accuracy: Accuracy = "fast",
+        random_state: int = 0,
+        scaling: Scaling = "log",
+    ) -> None:
+        self.n_segments = n_segments
+        self.covariance_type = covariance_type
+        self.n_eigenpairs = n_eigenpairs
+        self.n_energies = n_energies
+        self.accuracy = accuracy
+        self.random_state = random_state
+        self.scaling = scaling
+
+    def describe(self, mesh: TriangleMesh) -> PoseSignature:
+        """Compute the signature of one pose, to pass it to the other methods in the place of the mesh.
+
+        Raises
+        ------
+        ValueError
+            If a parameter of the model is out of range or the mesh has no usable face.
+        SpectrumError
+            If the eigenpairs could not be computed.
+        """
+        self._check_parameters()
+        surface = prepare_surface(mesh, VERTICES_PER_PAIR * self.n_eigenpairs)
+        n_pairs = self.n_eigenpairs + surface.n_components - 1
+        values, functions = eigenpairs(surface.mesh, n_pairs, self.accuracy)
+        return PoseSignature(surface, wave_kernel_signature(values, functions, self.n_energies))
+
+    def fit(self, meshes: Sequence[TriangleMesh | PoseSignature], progress: Progress | None = None) -> PoseSegmentation:
+        """Learn the parts from one or more poses together.
+
+        Parameters
+        ----------
+        meshes
+            The poses; they need not share their meshing. Each counts the same, whatever its size and number of
+            vertices. One pose alone is allowed, but says nothing of what a pose changes.
+        progress
+            Called before each pose and before the mixture is fitted.
+
+        Raises
+        ------
+        ValueError
+            If there is no pose, a parameter is out of range, or there are fewer vertices than segments.
+        SpectrumError
+            If the eigenpairs of a pose could not be computed.
+        """
+        self._check_parameters()
+        if not len(meshes):
+            raise ValueError("there is no pose to learn from: pass one mesh at least, better three to five")
+        poses = []
+        for i, mesh in enumerate(meshes):
+            if progress:
+                progress(f"pose {i + 1} of {len(meshes)}", i / (len(meshes) + 1))
+            poses.append(self._described(mesh))
+        if progress:
+            progress("mixture", len(meshes) / (len(meshes) + 1))
+        samples = np.concatenate([self._scaled(pose.signature) for pose in poses])
+        weights = np.concatenate([unit_area_masses(pose.surface.mesh) for pose in poses])
+        if self.n_segments > len(samples):
+            raise ValueError(f"n_segments is {self.n_segments}, but the poses have only {len(samples)} vertices")
+        shares = weights / weights.sum()
+        self.centre_ = shares @ samples
+        self.spread_ = np.sqrt(shares @ (samples - self.centre_) ** 2) + np.finfo(float).eps
+        if len(samples) > MAX_SAMPLES:
+            drawn = np.random.default_rng(self.random_state).choice(len(samples), MAX_SAMPLES, p=shares)
+            samples, shares = samples[drawn], np.full(MAX_SAMPLES, 1 / MAX_SAMPLES)
+        self.mixture_ = fit_mixture(
+            (samples - self.centre_) / self.spread_,
+            shares,
+            self.n_segments,
+            "shared" if self.covariance_type == "auto" else self.covariance_type,
+            self.random_state,
+        )
+        if progress:
+            progress("done", 1.0)
+        return self
+
+    def predict(self, mesh: TriangleMesh | PoseSignature) -> IntArray:
+        """(n,) component of each vertex: the one with the highest posterior, as in the paper."""
+        return np.asarray(self.predict_proba(mesh).argmax(axis=1))
+
+    def predict_proba(self, mesh: TriangleMesh | PoseSignature) -> FloatArray:
+        """(n, n_segments) posterior of each component at each vertex; rows sum to 1."""
+        pose = self._described(mesh)
+        return pose.surface.to_vertices(self._posteriors(pose))
+
+    def score(self, mesh: TriangleMesh | PoseSignature) -> float:
+        """Mean log-likelihood of the signature over the area: how well the model explains a shape (section 5).
+
+        Comparable between models with the same number of energies and the same scaling.
+        """
+        pose = self._described(mesh)
+        likelihoods = self._fitted().log_likelihoods(self._standardised(pose.signature))
+        masses = unit_area_masses(pose.surface.mesh)
+        # A density in standardised units, brought back to those of the signature that models share.
+        return float(masses @ likelihoods / masses.sum() - np.log(self.spread_).sum())
+
+    def segment_faces(self, mesh: TriangleMesh | PoseSignature, min_share: float = MIN_SHARE) -> IntArray:
+        """(m,) component of each face, cleaned: smooth borders, no connected part under `min_share` of the area."""
+        return self._clean([self._described(mesh)], None, min_share)[0]
+
+    def segment_regions(self, mesh: TriangleMesh | PoseSignature, min_share: float = MIN_SHARE) -> IntArray:
+        """(m,) connected part of each face, numbered 0, 1, …: left and right hand are two."""
+        return connected_regions(*self._clean([self._described(mesh)], None, min_share))
+
+    def segment_polygons(
+        self,
+        poses: Sequence[TriangleMesh | PoseSignature],
+        polygons: Sequence[IntArray],
+        min_share: float = MIN_SHARE,
+    ) -> IntArray:
+        """Label the polygons of one mesh, seen in one or several poses, as `segment_faces` does.
+
+        Parameters
+        ----------
+        poses
+            The same mesh in each pose, as triangles. The posteriors of all poses are averaged.
+        polygons
+            For each pose, the polygon that each triangle is a piece of; several triangles can be of one polygon, and
+            a polygon without a triangle takes no part (its label is 0).
+
+        Returns
+        -------
+        (p,) component of each polygon, 0 to the largest number in `polygons`.
+
+        Raises
+        ------
+        ValueError
+            If there is no pose, or the lengths do not fit.
+        """
+        described = [self._described(pose) for pose in poses]
+        if not described or len(described) != len(polygons):
+            raise ValueError(f"there are {len(described)} poses, but polygons for {len(polygons)}")
+        for i, (pose, polygon_of) in enumerate(zip(described, polygons, strict=True)):
+            if np.shape(polygon_of) != (pose.surface.original.n_faces,):
+                raise ValueError(
+                    f"pose {i} has {pose.surface.original.n_faces} triangles, but polygons for {np.shape(polygon_of)}"
+                )
+        return self._clean(described, polygons, min_share)[0]
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the fitted model to a JSON file that holds data only.
+
+        Raises
+        ------
+        ValueError
+            If the model is not fitted.
+        OSError
+            If the file cannot be written.
+        """
+        model_file.write(path, self.to_json())
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> PoseSegmentation:
+        """Read a model that `save` wrote.
+
+        Raises
+        ------
+        ModelFileError
+            If the file is no model, damaged, or of a newer version (a ValueError).
+        OSError
+            If the file cannot be read.
+        """
+        return cls.from_json(model_file.read(path))
+
+    def to_json(self) -> str:
+        """The fitted model as JSON text; ValueError if it is not fitted."""
+        mixture = self._fitted()
+        return model_file.encode(
+            {name: getattr(self, name) for name in model_file.PARAMETERS},
+            {"centre": self.centre_, "spread": self.spread_, "weights": mixture.weights, "means": mixture.means,
+             "covariances": mixture.covariances},
+            mixture.covariance_type,
+        )  # fmt: skip
+
+    @classmethod
+    def from_json(cls, text: str) -> PoseSegmentation:
+        """The model in JSON text; ModelFileError if it is none."""
+        parameters, arrays, covariance_type = model_file.decode(text)
+        model = cls(**parameters)
+        try:
+            model._check_parameters()
+        except (ValueError, TypeError) as error:
+            raise model_file.ModelFileError(f"the model has a bad parameter: {error}") from error
+        model.centre_, model.spread_ = arrays["centre"], arrays["spread"]
+        model.mixture_ = GaussianMixture(covariance_type, arrays["weights"], arrays["means"], arrays["covariances"])
+        return model
+
+    def _check_parameters(self) -> None:
+        for name, least in (("n_segments", 1), ("n_eigenpairs", 3), ("n_energies", 2), ("random_state", 0)):
+            value = getattr(self, name)
+            if not isinstance(value, int | np.integer) or value < least:
+                raise ValueError(f"{name} must be a whole number of at least {least}, not {value!r}")
+        choices = {
+            "covariance_type": ("auto", *get_args(CovarianceType)),
+            "accuracy": get_args(Accuracy),
+            "scaling": get_args(Scaling),
+        }
+        for name, allowed in choices.items():
+            if getattr(self, name) not in allowed:
+                raise ValueError(f"{name} must be one of {allowed}, not {getattr(self, name)!r}")
+
+    def _fitted(self) -> GaussianMixture:
+        if not hasattr(self, "mixture_"):
+            raise ValueError("the model is not fitted: call fit, or load a model, first")
+        return self.mixture_
+
+    def _described(self, mesh: TriangleMesh | PoseSignature) -> PoseSignature:
+        if isinstance(mesh, PoseSignature):
+            if mesh.signature.shape[1] != self.n_energies:
+                raise ValueError(f"the signature has {mesh.signature.shape[1]} energies, not {self.n_energies}")
+            return mesh
+        if not isinstance(mesh, TriangleMesh):
+            raise TypeError(f"a pose must be a TriangleMesh or a PoseSignature, not {type(mesh).__name__}")
+        return self.describe(mesh)
+
+    def _scaled(self, signature: FloatArray) -> FloatArray:
+        return np.log(signature + SIGNATURE_OFFSET) if self.scaling == "log" else signature
+
+    def _standardised(self, signature: FloatArray) -> FloatArray:
+        return np.asarray((self._scaled(signature) - self.centre_) / self.spread_)
+
+    def _posteriors(self, pose: PoseSignature) -> FloatArray:
+        mixture = self._fitted()
+        return mixture.posteriors(self._standardised(pose.signature))
+
+    def _clean(
+        self, poses: Sequence[PoseSignature], polygons: Sequence[IntArray] | None, min_share: float
+    ) -> tuple[IntArray, FaceAdjacency]:
+        """Labels of polygons (None: each triangle is one), from the mean posterior of all poses, and neighbours."""
+        if not 0 <= min_share < 1:
+            raise ValueError(f"min_share must be from 0 to below 1, not {min_share!r}")
+        if polygons is None:
+            polygons = [np.arange(pose.surface.original.n_faces) for pose in poses]
+        n_polygons = 1 + max(int(polygon_of.max()) for polygon_of in polygons)
+        posteriors = np.zeros((n_polygons, self.n_segments))
+        for pose, polygon_of in zip(poses, polygons, strict=True):
+            smooth = smooth_posteriors(pose.surface.mesh, self._posteriors(pose), SMOOTHING_LENGTH)
+            # A triangle without area still speaks, if very softly, or its polygon would have no label.
+            areas = pose.surface.original.face_areas / pose.surface.original.area + np.finfo(float).eps
+            sum_over = indicator(polygon_of, n_polygons)
+            total = np.maximum(sum_over @ areas, np.finfo(float).tiny)
+            posteriors += sum_over @ (pose.surface.to_faces(smooth) * areas[:, None]) / total[:, None]
+        # Sizes, places and borders are those of the first pose.
+        original, polygon_of = poses[0].surface.original, polygons[0]
+        sum_over = indicator(polygon_of, n_polygons)
+        areas = sum_over @ original.face_areas
+        count = np.maximum(sum_over @ np.ones(original.n_faces), 1)
+        centres = sum_over @ original.vertices[original.faces].mean(axis=1) / count[:, None]
+        adjacency = FaceAdjacency.of(poses[0].surface.welded_faces, poses[0].surface.mesh.vertices)
+        adjacency = adjacency.between_polygons(polygon_of)
+        return merge_crumbs(posteriors.argmax(axis=1), areas, centres, adjacency, min_share), adjacency
