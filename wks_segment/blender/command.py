@@ -188,13 +188,13 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
 
 def _demo(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     if options.input:
-        objects = mesh_objects(files.open_files([options.input])[0])
-        character = group(objects, together=True)[0]
+        character = group(mesh_objects(files.open_files([options.input])[0]), together=True)[0]
         _choose_action([character], options.action)
     else:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         character = demo.creature(bpy.context)
-    return demo.run(bpy.context, character, _settings(options), options.folder, options.learn, options.unseen, progress)
+    path = options.folder / (options.input.stem if options.input else "creature")
+    return demo.run(bpy.context, character, _settings(options), path, options.learn, options.unseen, progress)
 
 
 def _check_outputs(options: argparse.Namespace) -> None:

@@ -29,12 +29,13 @@ def creature(context: bpy.types.Context) -> Character:
 
 
 def run(
-    context: bpy.types.Context, character: Character, settings: WKSSegmentSettings, folder: Path,
+    context: bpy.types.Context, character: Character, settings: WKSSegmentSettings, path: Path,
     n_learned: int, n_unseen: int, progress: Progress,
 ) -> dict[str, Any]:  # fmt: skip
     """Learn a character's parts from frames of its animation and check them on other frames.
 
-    Writes `NAME.blend` with the labelled character, `NAME.png` with all poses side by side and the model.
+    Writes `path` with the suffixes .blend (the labelled character), .png (all poses side by side) and .json (the
+    model).
 
     Returns
     -------
@@ -49,9 +50,9 @@ def run(
     if n_learned < 1 or n_unseen < 1:
         raise UserError("The demo needs a pose to learn from and one to check on")
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise UserError(f"{folder}: the folder could not be made: {error.strerror}") from error
+        raise UserError(f"{path.parent}: the folder could not be made: {error.strerror}") from error
     report = Report([])
     frames = reader.own_frames(context.scene, character, n_learned + n_unseen)
     if len(frames) < n_learned + n_unseen:
@@ -75,7 +76,7 @@ def run(
     own = [labels_of[pose.name] for pose in poses]
     agreement = agreements(own, learned, [polygon_areas(pose, len(own[0])) for pose in poses])
 
-    paths = {kind: folder / f"{character.name.lower()}{suffix}" for kind, suffix in SUFFIXES.items()}
+    paths = {kind: path.with_name(path.name + suffix) for kind, suffix in SUFFIXES.items()}
     progress("Picture", 0.95)
     with report.stage("render"):
         captions = [f"{frame} {'learned' if known else 'unseen'}" for frame, known in zip(frames, learned, strict=True)]

@@ -114,7 +114,9 @@ def fit_mixture(
             raise ValueError(
                 f"{n_components} components are too many: the samples have only {len(np.unique(start))} distinct values"
             )
-        candidates.append(_maximise_likelihood(sketch, sketch_shares, np.eye(n_components)[start], covariance_type, floor))
+        candidates.append(
+            _maximise_likelihood(sketch, sketch_shares, np.eye(n_components)[start], covariance_type, floor)
+        )
     best = max(candidates, key=lambda candidate: candidate[1])[0]
     return _in_order(_maximise_likelihood(samples, shares, best.posteriors(samples), covariance_type, floor)[0])
 

@@ -1,0 +1,181 @@
+"""Small characters, and what the tests ask of a mesh."""
+
+from functools import cache
+
+import bmesh
+import bpy
+import numpy as np
+
+LIMBS = np.array([[1.0, 0.0, 0.2], [-0.5, 0.8, 0.1], [-0.4, -0.7, -0.5]])
+"""Directions of the three limbs of the test character."""
+LENGTHS = np.array([2.2, 1.5, 1.0])
+"""How far each limb sticks out of the unit sphere."""
+UPPER = 1.3
+"""Where the longest limb bends, along x."""
+
+
+@cache
+def _sphere(subdivisions):
+    sphere = bmesh.new()
+    bmesh.ops.create_icosphere(sphere, subdivisions=subdivisions, radius=1.0)
+    points = np.array([vertex.co for vertex in sphere.verts])
+    faces = np.array([[vertex.index for vertex in face.verts] for face in sphere.faces])
+    sphere.free()
+    return points, faces
+
+
+def limbed_surface(bend=0.0, subdivisions=3):
+    """Points and triangles of a ball with three limbs, the longest of which is bent upwards."""
+    points, faces = _sphere(subdivisions)
+    towards = np.arccos(np.clip(points @ (LIMBS / np.linalg.norm(LIMBS, axis=1)[:, None]).T, -1, 1))
+    points = points * (1 + np.exp(-((towards / 0.45) ** 2)) @ LENGTHS)[:, None]
+    return bent(points, bend), faces
+
+
+def bent(points, bend):
+    """The points with the end of the longest limb turned about the y axis, by an angle."""
+    beyond = np.clip(points[:, 0] - UPPER, 0, None)
+    result = points.copy()
+    result[:, 0] += beyond * (np.cos(bend) - 1)
+    result[:, 2] += beyond * np.sin(bend)
+    return result
+
+
+def mesh_object(points, faces, name="Object"):
+    """An object of the current scene with these vertices and faces."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(np.asarray(points).tolist(), [], [list(map(int, face)) for face in faces])
+    obj = bpy.data.objects.new(name, mesh)
+    bpy.context.scene.collection.objects.link(obj)
+    bpy.context.view_layer.update()
+    return obj
+
+
+def limbed(name="Limbed", bend=0.0, subdivisions=3):
+    """A ball with three limbs, in one pose."""
+    return mesh_object(*limbed_surface(bend, subdivisions), name)
+
+
+def limbed_poses(*bends, subdivisions=3):
+    """A ball with three limbs, an object a pose."""
+    return [limbed(f"Pose {i}", bend, subdivisions) for i, bend in enumerate(bends)]
+
+
+def limbed_keys(*bends, name="Keyed"):
+    """A ball with three limbs, a shape key a pose, behind the basis."""
+    obj = limbed(name)
+    basis = coordinates(obj.data)
+    obj.shape_key_add(name="Basis")
+    for bend in bends:
+        obj.shape_key_add(name=f"Bend {bend}").data.foreach_set("co", bent(basis, bend).ravel())
+    return obj
+
+
+def rig(objects, name="Rig", bends=((1, 0.0), (11, 0.9), (21, -0.5))):
+    """An armature that bends the longest limb of objects, keyed at frames with angles."""
+    data = bpy.data.armatures.new(name)
+    armature = bpy.data.objects.new(name, data)
+    bpy.context.scene.collection.objects.link(armature)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    root = data.edit_bones.new("root")
+    root.head, root.tail = (0, 0, 0), (UPPER, 0, 0)
+    limb = data.edit_bones.new("limb")
+    limb.head, limb.tail, limb.parent = (UPPER, 0, 0), (UPPER + 2, 0, 0), root
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bone = armature.pose.bones["limb"]
+    bone.rotation_mode = "XYZ"
+    for frame, bend in bends:
+        bone.rotation_euler = (bend, 0, 0)
+        bone.keyframe_insert("rotation_euler", frame=frame)
+    for obj in objects:
+        weight = np.clip(3 * (coordinates(obj.data)[:, 0] - UPPER) + 0.5, 0, 1)
+        groups = {bone_name: obj.vertex_groups.new(name=bone_name) for bone_name in ("root", "limb")}
+        for i, share in enumerate(weight.tolist()):
+            groups["limb"].add([i], share, "REPLACE")
+            groups["root"].add([i], 1 - share, "REPLACE")
+        obj.parent = armature
+        obj.modifiers.new("Armature", "ARMATURE").object = armature
+    bpy.context.scene.frame_set(bends[0][0])
+    return armature
+
+
+def limbed_rigged(name="Walker", **options):
+    """A ball with three limbs whose longest one an armature bends, over frames 1 to 21."""
+    obj = limbed(name)
+    rig([obj], **options)
+    return obj
+
+
+def select(*objects):
+    """Select objects and nothing else; the first is active."""
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj in objects)
+    bpy.context.view_layer.objects.active = objects[0] if objects else None
+
+
+def coordinates(mesh):
+    """(n, 3) array of a mesh's own coordinates."""
+    points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+    mesh.vertices.foreach_get("co", points.ravel())
+    return points.astype(np.float64)
+
+
+def numbers(mesh, name, prop="value", width=1):
+    """The values of an attribute, as an array."""
+    data = mesh.attributes[name].data
+    values = np.empty(len(data) * width, dtype=np.float64)
+    data.foreach_get(prop, values)
+    return values if width == 1 else values.reshape(-1, width)
+
+
+def labels_of(obj):
+    """(p,) components that were written to an object's faces."""
+    return numbers(obj.data, "wks_segment").astype(int)
+
+
+PROPERTIES = {
+    "FLOAT_VECTOR": ("vector", 3), "FLOAT2": ("vector", 2), "INT32_2D": ("value", 2),
+    "BYTE_COLOR": ("color", 4), "FLOAT_COLOR": ("color", 4),
+}  # fmt: skip
+
+
+def snapshot(mesh):
+    """All that an artist could miss of a mesh, in a form that can be compared."""
+    attributes = {}
+    for attribute in mesh.attributes:
+        prop, width = PROPERTIES.get(attribute.data_type, ("value", 1))
+        values = tuple(numbers(mesh, attribute.name, prop, width).ravel().tolist())
+        attributes[attribute.name] = (attribute.domain, attribute.data_type, values)
+    material_index = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.polygons.foreach_get("material_index", material_index)
+    active = mesh.attributes.active
+    return {
+        "attributes": attributes,
+        "active attribute": active.name if active else None,
+        "active color": mesh.attributes.active_color_name,
+        "default color": mesh.attributes.default_color_name,
+        "render color": mesh.color_attributes.render_color_index,
+        "active uv": mesh.uv_layers.active_index,
+        "slots": [material.name if material else None for material in mesh.materials],
+        "material index": material_index.tolist(),
+        "properties": {key: str(mesh[key]) for key in mesh.keys()},  # noqa: SIM118  # no dictionary
+        "size": (len(mesh.vertices), len(mesh.edges), len(mesh.polygons)),
+    }
+
+
+def scene_snapshot():
+    """All meshes, materials and objects of the file, and what the scene shows."""
+    context = bpy.context
+    return {
+        "meshes": {mesh.name: snapshot(mesh) for mesh in bpy.data.meshes},
+        "objects": {
+            obj.name: (obj.select_get(), obj.active_shape_key_index, obj.show_only_shape_key)
+            for obj in bpy.data.objects
+        },
+        "materials": sorted(material.name for material in bpy.data.materials),
+        "scenes": [scene.name for scene in bpy.data.scenes],
+        "active": context.view_layer.objects.active,
+        "frame": (context.scene.frame_current, context.scene.frame_subframe),
+        "model": (context.scene.wks_segment.model, context.scene.wks_segment.model_summary),
+    }

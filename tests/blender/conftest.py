@@ -1,0 +1,126 @@
+"""What the tests of the Blender part share. Needs bpy; without it they are left out.
+
+`builders` makes the characters, this file the surroundings: settings of their own, an empty scene, a way out.
+"""
+
+import contextlib
+import ctypes
+import importlib.util
+import json
+import os
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+# Before bpy is imported: neither the user's settings nor the user's extensions take part.
+RESOURCES = tempfile.mkdtemp(prefix="wks_segment_tests_")
+os.environ["BLENDER_USER_RESOURCES"] = RESOURCES
+HAS_BPY = importlib.util.find_spec("bpy") is not None
+if not HAS_BPY:
+    collect_ignore = [path.name for path in Path(__file__).parent.glob("test_*.py") if "zip" not in path.name]
+SESSION = pytest.StashKey[pytest.Session]()
+
+
+def pytest_report_header():
+    if not HAS_BPY:
+        return "bpy is not installed: the tests of the Blender part are left out"
+    import bpy
+
+    return f"bpy: {bpy.app.version_string}"
+
+
+def pytest_sessionstart(session):
+    session.config.stash[SESSION] = session
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection(session):
+    # Here, too, since a conftest.py of a subfolder is loaded only after the session has started.
+    session.config.stash[SESSION] = session
+    return (yield)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config):
+    """End the process before Blender does: 4.2 crashes at a normal exit, 4.5 hangs."""
+    shutil.rmtree(RESOURCES, ignore_errors=True)
+    session = config.stash.get(SESSION, None)
+    if session is not None and "bpy" in sys.modules:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(int(session.exitstatus))
+
+
+@pytest.fixture(scope="session")
+def extension():
+    """The package, registered as Blender does it when the extension is enabled."""
+    import wks_segment.blender
+
+    wks_segment.blender.register()
+    yield wks_segment.blender
+    wks_segment.blender.unregister()
+
+
+@pytest.fixture
+def scene(extension):
+    """An empty scene, with settings that make a computation take a tenth of a second."""
+    import bpy
+
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    settings = bpy.context.scene.wks_segment
+    settings.source = "OBJECTS"
+    settings.n_segments, settings.n_eigenpairs, settings.n_energies = 4, 30, 40
+    return bpy.context.scene
+
+
+@pytest.fixture
+def settings(scene):
+    return scene.wks_segment
+
+
+@pytest.fixture
+def printed(capfd):
+    """A function that gives what was printed since its last call, Blender's own lines among them."""
+
+    def read():
+        sys.stdout.flush()
+        ctypes.CDLL(None).fflush(None)
+        return capfd.readouterr()
+
+    return read
+
+
+class Outcome:
+    """How a command ended: its exit code and what it printed."""
+
+    def __init__(self, code, out, err):
+        self.code, self.out, self.err = code, out, err
+
+    @property
+    def result(self):
+        """The JSON object that it printed, if it printed that and nothing else."""
+        assert self.out.count("\n") == 1, f"not one line on standard output:\n{self.out}"
+        return json.loads(self.out)
+
+    def __repr__(self):
+        return f"exit code {self.code}\nstandard output:\n{self.out}\nstandard error:\n{self.err}"
+
+
+@pytest.fixture
+def command(scene, extension, printed):
+    """A function that runs the command line in this process."""
+
+    def run(*arguments):
+        printed()
+        # pytest's own sys.stdout does not write to descriptor 1, as that of a real process does.
+        with open(1, "w", encoding="utf-8", closefd=False) as stdout, contextlib.redirect_stdout(stdout):
+            try:
+                code = extension.command.run([str(argument) for argument in arguments])
+            except SystemExit as end:
+                code = end.code
+        return Outcome(code, *printed())
+
+    return run

@@ -1,0 +1,83 @@
+import json
+
+import pytest
+from shapes import creature
+
+from wks_segment.core import ModelFileError, PoseSegmentation
+
+
+@pytest.fixture(scope="module")
+def text():
+    return PoseSegmentation(3, n_eigenpairs=30, n_energies=20).fit([creature(0.0, 3)]).to_json()
+
+
+def test_a_model_is_plain_json(text):
+    content = json.loads(text)
+    assert content["format"] == "wks_segment model"
+    assert content["parameters"]["n_segments"] == 3
+
+
+def changed(text, change):
+    content = json.loads(text)
+    change(content)
+    return json.dumps(content)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda c: c.update(format="glTF"), "not a model of WKS Segment"),
+        (lambda c: c.update(version=99), "the model has version 99, this program reads 1"),
+        (lambda c: c.pop("means"), "means is missing"),
+        (lambda c: c["means"].pop(), r"means has the shape \(2, 20\), not \(3, 20\)"),
+        (lambda c: c["means"][0].__setitem__(0, "x"), "means is missing or not numbers"),
+        (lambda c: c["centre"].__setitem__(0, float("nan")), "centre has a number that is not finite"),
+        (lambda c: c["covariances"].__setitem__(0, -1.0), "not positive"),
+        (lambda c: c["spread"].__setitem__(0, 0.0), "not positive"),
+        (lambda c: c.update(mixture_covariance_type="round"), "unknown covariance type"),
+        (lambda c: c["parameters"].pop("n_energies"), "its parameters are not"),
+        (lambda c: c["parameters"].update(accuracy="best"), "bad parameter: accuracy must be one of"),
+        (lambda c: c["parameters"].update(n_segments=10**9), "shape"),
+        (lambda c: c["parameters"].update(n_segments=[3]), "shape"),
+    ],
+)
+def test_a_damaged_model_is_refused_with_the_reason(text, change, message):
+    with pytest.raises(ModelFileError, match=message):
+        PoseSegmentation.from_json(changed(text, change))
+
+
+@pytest.mark.parametrize("foreign", ["", "{", "[]", "42", '"text"', "[" * 100_000])
+def test_foreign_text_is_refused(foreign):
+    with pytest.raises(ModelFileError, match="not a model of WKS Segment"):
+        PoseSegmentation.from_json(foreign)
+
+
+def test_a_binary_file_is_refused(tmp_path):
+    path = tmp_path / "model.json"
+    path.write_bytes(bytes(range(256)))
+    with pytest.raises(ModelFileError, match="binary file"):
+        PoseSegmentation.load(path)
+
+
+def test_a_huge_file_is_refused_before_it_is_read(tmp_path):
+    path = tmp_path / "model.json"
+    with path.open("wb") as file:
+        file.truncate(2**40)  # a sparse file: a terabyte by its size, nothing on the disk
+    with pytest.raises(ModelFileError, match="too large"):
+        PoseSegmentation.load(path)
+
+
+def test_a_failed_save_leaves_the_old_file(tmp_path, text, monkeypatch):
+    path = tmp_path / "model.json"
+    path.write_text("precious")
+    model = PoseSegmentation.from_json(text)
+    monkeypatch.setattr("os.replace", lambda *_: (_ for _ in ()).throw(OSError("disk full")))
+    with pytest.raises(OSError, match="disk full"):
+        model.save(path)
+    assert path.read_text() == "precious"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_missing_folder_is_an_os_error(tmp_path, text):
+    with pytest.raises(FileNotFoundError):
+        PoseSegmentation.from_json(text).save(tmp_path / "nowhere" / "model.json")

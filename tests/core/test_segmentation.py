@@ -1,0 +1,173 @@
+import numpy as np
+import pytest
+from shapes import creature, icosphere, split_at_every_corner, together
+
+from wks_segment.core import PoseSegmentation, TriangleMesh, prepare_surface
+from wks_segment.core.regions import FaceAdjacency, connected_regions
+
+SMALL = {"n_segments": 4, "n_eigenpairs": 60}
+POSES = [creature(bend) for bend in (0.0, 0.6, 1.2)]
+
+
+@pytest.fixture(scope="module")
+def model():
+    return PoseSegmentation(**SMALL).fit(POSES)
+
+
+def test_unseen_poses_get_the_same_labels(model):
+    usual = model.predict(POSES[0])
+    for bend in (0.3, 0.9):
+        pose = creature(bend)
+        assert (pose.vertex_areas @ (model.predict(pose) == usual)) / pose.area > 0.95
+
+
+def test_a_finer_mesh_of_the_same_body_gets_the_same_labels(model):
+    # The vertices of the coarser icosphere are the first of the finer one.
+    coarse = model.predict(POSES[0])
+    fine = model.predict(creature(0.0, 5))[: len(coarse)]
+    assert (coarse == fine).mean() > 0.95
+
+
+def test_labels_do_not_depend_on_place_size_or_order_of_vertices(model):
+    pose = POSES[1]
+    order = np.random.default_rng(2).permutation(pose.n_vertices)
+    moved = TriangleMesh(0.01 * pose.vertices[order] + 7, np.argsort(order)[pose.faces])
+    assert (model.predict(moved) == model.predict(pose)[order]).mean() > 0.999
+
+
+def test_posteriors_are_probabilities_and_the_label_is_the_largest(model):
+    described = model.describe(POSES[0])
+    posteriors = model.predict_proba(described)
+    assert posteriors.shape == (POSES[0].n_vertices, 4)
+    np.testing.assert_allclose(posteriors.sum(axis=1), 1.0)
+    np.testing.assert_array_equal(model.predict(described), posteriors.argmax(axis=1))
+
+
+def test_parts_are_connected_and_not_too_small(model):
+    described = model.describe(POSES[2])
+    labels, regions = model.segment_faces(described), model.segment_regions(described)
+    mesh = POSES[2]
+    adjacency = FaceAdjacency.of(mesh.faces, mesh.vertices)
+    assert np.bincount(regions, weights=mesh.face_areas).min() >= 0.005 * mesh.area
+    np.testing.assert_array_equal(connected_regions(labels, adjacency), regions)
+    assert regions.max() + 1 > len(np.unique(labels))  # the two short limbs are one component, two regions
+
+
+def test_the_thin_end_and_the_body_are_different_parts(model):
+    labels = model.predict(POSES[0])
+    tip = labels[np.argmax(POSES[0].vertices[:, 0])]
+    body = labels[np.argmin(np.abs(POSES[0].vertices - (0, 0, -1)).sum(axis=1))]
+    assert tip != body
+
+
+def test_a_query_scores_highest_under_the_model_of_its_own_class(model):
+    def stretched(bend):
+        ball = creature(bend, 3)
+        return TriangleMesh(ball.vertices * (1, 0.4, 2.5), ball.faces)
+
+    other = PoseSegmentation(**SMALL).fit([stretched(bend) for bend in (0.0, 0.3, 0.6)])
+    assert model.score(creature(0.9)) > other.score(creature(0.9)) + 10
+    assert other.score(stretched(0.45)) > model.score(stretched(0.45)) + 10
+
+
+@pytest.mark.parametrize("covariance_type", ["auto", "shared", "diag", "spherical", "tied", "full"])
+@pytest.mark.parametrize("scaling", ["log", "raw"])
+def test_every_setting_learns_and_survives_saving(tmp_path, model, covariance_type, scaling):
+    described = [model.describe(pose) for pose in POSES[:2]]
+    fitted = PoseSegmentation(**SMALL, covariance_type=covariance_type, scaling=scaling).fit(described)
+    fitted.save(tmp_path / "model.json")
+    loaded = PoseSegmentation.load(tmp_path / "model.json")
+    np.testing.assert_array_equal(loaded.predict_proba(described[0]), fitted.predict_proba(described[0]))
+    assert loaded.score(described[1]) == fitted.score(described[1])
+    assert loaded.covariance_type == covariance_type
+
+
+def test_the_same_seed_gives_the_same_labels(model):
+    again = PoseSegmentation(**SMALL).fit(POSES)
+    np.testing.assert_array_equal(again.predict(POSES[0]), model.predict(POSES[0]))
+
+
+def test_seams_do_not_matter_and_each_copy_of_a_vertex_gets_the_label(model):
+    soup = split_at_every_corner(POSES[0])
+    np.testing.assert_array_equal(model.predict(soup), model.predict(POSES[0])[POSES[0].faces.ravel()])
+
+
+def test_a_coarse_mesh_is_refined_inside_and_labelled_as_it_is():
+    coarse = [creature(bend, 2) for bend in (0.0, 0.6)]
+    fitted = PoseSegmentation(3, n_eigenpairs=100).fit(coarse)
+    assert fitted.describe(coarse[0]).surface.mesh.n_vertices >= 1000
+    assert fitted.predict(coarse[0]).shape == (coarse[0].n_vertices,)
+    assert fitted.segment_faces(coarse[0]).shape == (coarse[0].n_faces,)
+
+
+def test_loose_parts_all_get_labels_and_do_not_break_the_body():
+    def with_eyes(bend):
+        eyes = [TriangleMesh(0.1 * icosphere(1).vertices + place, icosphere(1).faces) for place in (2.0, -2.0)]
+        return together(creature(bend), *eyes)
+
+    fitted = PoseSegmentation(**SMALL).fit([with_eyes(0.0), with_eyes(0.6)])
+    labels = fitted.predict(with_eyes(0.0))
+    unseen = fitted.predict(with_eyes(0.3))
+    assert (labels == unseen).mean() > 0.95
+    assert len(np.unique(labels[: POSES[0].n_vertices])) >= 3
+    assert set(fitted.segment_faces(with_eyes(0.3))) <= set(range(4))
+
+
+def test_polygons_of_several_triangles_are_labelled_as_wholes_over_all_poses(model):
+    # Each triangle of the coarse mesh is a polygon of four of the fine one.
+    coarse = [creature(bend, 3) for bend in (0.0, 0.6)]
+    fine = [prepare_surface(mesh, 2000) for mesh in coarse]
+    labels = model.segment_polygons([surface.mesh for surface in fine], [surface.face_of for surface in fine])
+    assert labels.shape == (coarse[0].n_faces,)
+    assert (labels == model.segment_faces(coarse[0])).mean() > 0.9
+    with pytest.raises(ValueError, match="there are 2 poses, but polygons for 1"):
+        model.segment_polygons(coarse, [np.arange(coarse[0].n_faces)])
+    with pytest.raises(ValueError, match="pose 0 has 1280 triangles, but polygons for"):
+        model.segment_polygons(coarse[:1], [np.arange(3)])
+
+
+def test_progress_rises_to_one():
+    seen = []
+    PoseSegmentation(**SMALL).fit(POSES[:2], progress=lambda stage, fraction: seen.append((stage, fraction)))
+    fractions = [fraction for _, fraction in seen]
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
+    assert seen[0][0] == "pose 1 of 2"
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"n_segments": 0}, "n_segments must be a whole number of at least 1, not 0"),
+        ({"n_segments": "8"}, "n_segments must be a whole number"),
+        ({"n_eigenpairs": 2}, "n_eigenpairs must be"),
+        ({"n_energies": 1.5}, "n_energies must be"),
+        ({"covariance_type": "round"}, "covariance_type must be one of"),
+        ({"accuracy": "best"}, "accuracy must be one of"),
+        ({"scaling": "cube"}, "scaling must be one of"),
+        ({"random_state": -1}, "random_state must be"),
+        ({"n_segments": 100_000}, "n_segments is 100000, but the poses have only"),
+    ],
+)
+def test_bad_parameters_are_named(change, message):
+    with pytest.raises(ValueError, match=message):
+        PoseSegmentation(**{**SMALL, **change}).fit([POSES[0]])
+
+
+def test_no_pose_is_an_error():
+    with pytest.raises(ValueError, match="no pose to learn from"):
+        PoseSegmentation().fit([])
+
+
+def test_an_unfitted_model_says_so(tmp_path):
+    unfitted = PoseSegmentation(**SMALL)
+    for use in (unfitted.predict, unfitted.score, unfitted.segment_faces):
+        with pytest.raises(ValueError, match="not fitted"):
+            use(creature(0.0, 3))
+    with pytest.raises(ValueError, match="not fitted"):
+        unfitted.save(tmp_path / "model.json")
+
+
+def test_something_else_than_a_mesh_is_named(model):
+    with pytest.raises(TypeError, match="must be a TriangleMesh or a PoseSignature, not list"):
+        model.predict([1, 2, 3])

@@ -1,0 +1,105 @@
+import numpy as np
+import pytest
+from shapes import creature, grid, icosphere, together
+
+from wks_segment.core import TriangleMesh, eigenpairs, mass_matrix, spectrum, stiffness_matrix
+
+
+def test_eigenvalues_of_the_sphere():
+    # k (k + 1) on the unit sphere, 2 k + 1 times each; times 4 π on the sphere of area 1.
+    values, _ = eigenpairs(icosphere(5), 49)
+    expected = np.concatenate([[k * (k + 1)] * (2 * k + 1) for k in range(7)]) * 4 * np.pi
+    np.testing.assert_allclose(values, expected, rtol=0.005, atol=1e-9)
+
+
+def test_eigenvalues_of_the_rectangle_with_free_border():
+    # π² (i² / a² + j² / b²) with Neumann's condition, on a × b = 1.
+    a, b = 1.25, 0.8
+    values, _ = eigenpairs(grid(50, 32, a, b), 20)
+    i, j = np.meshgrid(np.arange(12), np.arange(12))
+    expected = np.sort((np.pi**2 * (i**2 / a**2 + j**2 / b**2)).ravel())[:20]
+    np.testing.assert_allclose(values, expected, rtol=0.01, atol=1e-9)
+
+
+@pytest.mark.parametrize("n_pairs", [1, 40, 300])
+def test_pairs_solve_the_problem_and_are_orthonormal(n_pairs):
+    mesh = creature(0.4)
+    values, functions = eigenpairs(mesh, n_pairs, accuracy="exact")
+    mass = mass_matrix(mesh) / mesh.area
+    np.testing.assert_allclose(functions.T @ mass @ functions, np.eye(n_pairs), atol=1e-8)
+    residual = stiffness_matrix(mesh) @ functions - mass @ functions * values
+    # In the norm of M⁻¹, relative to the value; the zero mode against 1.
+    size = np.sqrt((residual**2 / mass.diagonal()[:, None]).sum(axis=0))
+    assert (size / np.maximum(values, 1)).max() < 1e-8
+    assert (np.diff(values) >= 0).all()
+
+
+def test_iterative_and_dense_solver_agree(monkeypatch):
+    mesh = creature(0.3, 3)
+    monkeypatch.setattr(spectrum, "DENSE_BELOW", 10_000)
+    dense, _ = eigenpairs(mesh, 100)
+    monkeypatch.setattr(spectrum, "DENSE_BELOW", 0)
+    iterative, _ = eigenpairs(mesh, 100)
+    np.testing.assert_allclose(iterative, dense, rtol=1e-9, atol=1e-9)
+
+
+def test_equal_components_have_every_eigenvalue_as_often_as_there_are_of_them(monkeypatch):
+    monkeypatch.setattr(spectrum, "DENSE_BELOW", 0)
+    one = creature(0.2, 3)
+    apart = [TriangleMesh(one.vertices + 20 * i, one.faces) for i in range(4)]
+    values, _ = eigenpairs(together(*apart), 80)
+    # Four times the area: on the scale of area 1 the values of one are four times as large.
+    single, _ = eigenpairs(one, 20)
+    np.testing.assert_allclose(values, np.repeat(4 * single, 4), rtol=1e-8, atol=1e-8)
+
+
+def test_each_component_has_a_zero_mode():
+    values, functions = eigenpairs(together(icosphere(2), grid(6, 6)), 10)
+    assert (values[:2] == 0).all()
+    assert values[2] > 1
+    for k in range(2):
+        assert len(np.unique(functions[:, k].round(12))) == 2
+
+
+def test_missed_pairs_are_found_again(monkeypatch):
+    # A Lanczos run that drops pairs, as some SciPy versions do with clusters, must be noticed and mended.
+    monkeypatch.setattr(spectrum, "DENSE_BELOW", 0)
+    mesh = creature(0.3, 3)
+    expected, _ = eigenpairs(mesh, 50)
+    real, calls = spectrum._lanczos, []
+
+    def forgetful(factor, known, count):
+        calls.append(count)
+        found = real(factor, known, count + 3) if len(calls) == 1 else real(factor, known, count)
+        return np.delete(found, [found.shape[1] // 2, found.shape[1] // 2 + 1, 5], axis=1) if len(calls) == 1 else found
+
+    monkeypatch.setattr(spectrum, "_lanczos", forgetful)
+    values, _ = eigenpairs(mesh, 50)
+    assert len(calls) > 1
+    np.testing.assert_allclose(values, expected, rtol=1e-9, atol=1e-9)
+
+
+def test_inaccurate_pairs_are_refused(monkeypatch):
+    monkeypatch.setattr(spectrum, "DENSE_BELOW", 0)
+    monkeypatch.setattr(spectrum, "TOLERANCE", 1e-20)
+    with pytest.raises(spectrum.SpectrumError, match="not accurate enough: relative residual"):
+        eigenpairs(creature(0.3, 3), 20)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"n_pairs": 0}, "n_pairs must be from 1"),
+        ({"n_pairs": 10_000}, "n_pairs must be from 1 to the number of vertices"),
+        ({"accuracy": "rough"}, "accuracy must be one of"),
+    ],
+)
+def test_bad_parameters_are_named(change, message):
+    with pytest.raises(ValueError, match=message):
+        eigenpairs(icosphere(2), **{"n_pairs": 10, **change})
+
+
+def test_a_vertex_without_a_face_is_named():
+    mesh = grid(3, 3)
+    with pytest.raises(ValueError, match="vertex 16 belongs to no face"):
+        eigenpairs(TriangleMesh(np.concatenate([mesh.vertices, [(5, 5, 5)]]), mesh.faces), 5)
