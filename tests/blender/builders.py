@@ -24,7 +24,7 @@ def _sphere(subdivisions):
     return points, faces
 
 
-def limbed_surface(bend=0.0, subdivisions=3):
+def limbed_surface(bend=0.0, subdivisions=4):
     """Points and triangles of a ball with three limbs, the longest of which is bent upwards."""
     points, faces = _sphere(subdivisions)
     towards = np.arccos(np.clip(points @ (LIMBS / np.linalg.norm(LIMBS, axis=1)[:, None]).T, -1, 1))
@@ -51,12 +51,12 @@ def mesh_object(points, faces, name="Object"):
     return obj
 
 
-def limbed(name="Limbed", bend=0.0, subdivisions=3):
+def limbed(name="Limbed", bend=0.0, subdivisions=4):
     """A ball with three limbs, in one pose."""
     return mesh_object(*limbed_surface(bend, subdivisions), name)
 
 
-def limbed_poses(*bends, subdivisions=3):
+def limbed_poses(*bends, subdivisions=4):
     """A ball with three limbs, an object a pose."""
     return [limbed(f"Pose {i}", bend, subdivisions) for i, bend in enumerate(bends)]
 
@@ -135,8 +135,7 @@ def labels_of(obj):
 
 
 PROPERTIES = {
-    "FLOAT_VECTOR": ("vector", 3), "FLOAT2": ("vector", 2), "INT32_2D": ("value", 2),
-    "BYTE_COLOR": ("color", 4), "FLOAT_COLOR": ("color", 4),
+    "FLOAT_VECTOR": ("vector", 3), "FLOAT2": ("vector", 2), "BYTE_COLOR": ("color", 4), "FLOAT_COLOR": ("color", 4),
 }  # fmt: skip
 
 
@@ -144,9 +143,13 @@ def snapshot(mesh):
     """All that an artist could miss of a mesh, in a form that can be compared."""
     attributes = {}
     for attribute in mesh.attributes:
-        prop, width = PROPERTIES.get(attribute.data_type, ("value", 1))
-        values = tuple(numbers(mesh, attribute.name, prop, width).ravel().tolist())
+        values = ()
+        if not attribute.name.startswith("."):  # of its own ones Blender 5.0 gives some a wrong type
+            prop, width = PROPERTIES.get(attribute.data_type, ("value", 1))
+            values = tuple(numbers(mesh, attribute.name, prop, width).ravel().tolist())
         attributes[attribute.name] = (attribute.domain, attribute.data_type, values)
+    corners = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
     material_index = np.empty(len(mesh.polygons), dtype=np.int32)
     mesh.polygons.foreach_get("material_index", material_index)
     active = mesh.attributes.active
@@ -159,7 +162,8 @@ def snapshot(mesh):
         "active uv": mesh.uv_layers.active_index,
         "slots": [material.name if material else None for material in mesh.materials],
         "material index": material_index.tolist(),
-        "properties": {key: str(mesh[key]) for key in mesh.keys()},  # noqa: SIM118  # no dictionary
+        "properties": {key: getattr(value, "to_dict", lambda value=value: value)() for key, value in mesh.items()},
+        "corners": corners.tolist(),
         "size": (len(mesh.vertices), len(mesh.edges), len(mesh.polygons)),
     }
 

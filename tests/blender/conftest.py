@@ -18,29 +18,21 @@ import pytest
 # Before bpy is imported: neither the user's settings nor the user's extensions take part.
 RESOURCES = tempfile.mkdtemp(prefix="wks_segment_tests_")
 os.environ["BLENDER_USER_RESOURCES"] = RESOURCES
+# And before OpenMP is loaded: its threads wait for each other in a loop, which makes small problems slow, not fast.
+os.environ["OMP_NUM_THREADS"] = "1"
 HAS_BPY = importlib.util.find_spec("bpy") is not None
 if not HAS_BPY:
     collect_ignore = [path.name for path in Path(__file__).parent.glob("test_*.py") if "zip" not in path.name]
 SESSION = pytest.StashKey[pytest.Session]()
 
 
-def pytest_report_header():
+def pytest_collection_finish(session):
+    session.config.stash[SESSION] = session
+
+
+def pytest_terminal_summary(terminalreporter):
     if not HAS_BPY:
-        return "bpy is not installed: the tests of the Blender part are left out"
-    import bpy
-
-    return f"bpy: {bpy.app.version_string}"
-
-
-def pytest_sessionstart(session):
-    session.config.stash[SESSION] = session
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_collection(session):
-    # Here, too, since a conftest.py of a subfolder is loaded only after the session has started.
-    session.config.stash[SESSION] = session
-    return (yield)
+        terminalreporter.write_line("bpy is not installed: the tests of the Blender part were left out", yellow=True)
 
 
 @pytest.hookimpl(trylast=True)

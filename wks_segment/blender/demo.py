@@ -105,7 +105,7 @@ def split(count: int, n_learned: int) -> list[bool]:
 
 def polygon_areas(pose: reader.Pose, n_polygons: int) -> FloatArray:
     """(p,) area of each polygon."""
-    return np.bincount(pose.polygon_of, weights=pose.mesh.face_areas, minlength=n_polygons)
+    return np.bincount(pose.polygon_of, weights=pose.mesh.face_areas, minlength=n_polygons).astype(np.float64)
 
 
 def agreements(labels: list[IntArray], learned: list[bool], areas: list[FloatArray]) -> list[float]:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.mesh import IntArray
 from .palette import palette
@@ -72,7 +75,7 @@ def read_labels(mesh: bpy.types.Mesh) -> IntArray | None:
     return labels.astype(np.int64)
 
 
-def _write_ints(mesh: bpy.types.Mesh, name: str, domain: str, values: IntArray) -> str:
+def _write_ints(mesh: bpy.types.Mesh, name: str, domain: str, values: NDArray[np.integer[Any]]) -> str:
     """Add an int attribute; the name that it got, since a name that is taken gets a number."""
     attribute = mesh.attributes.new(name, "INT", domain)
     attribute.data.foreach_set("value", np.asarray(values, dtype=np.int32))

@@ -26,6 +26,10 @@ MARGIN = 1.16
 """Width and height of a tile, in those of the largest pose: leaves room for the caption."""
 CAPTION_SIZE = 0.05
 """Height of the letters, in tiles."""
+BACKGROUND = (0.82, 0.82, 0.84)
+"""Linear RGB of what is behind the poses."""
+CAPTION_COLOR = (0.05, 0.05, 0.05)
+"""sRGB of the letters."""
 COLORS = "color"
 
 
@@ -70,6 +74,8 @@ def render_poses(tiles: Sequence[Tile], path: Path, columns: int = COLUMNS) -> N
 def _scene() -> Iterator[bpy.types.Scene]:
     """An empty scene that takes all that was added to it along when it goes."""
     scene = bpy.data.scenes.new("WKS Segment picture")
+    scene.world = bpy.data.worlds.new("WKS Segment picture")
+    scene.world.color = BACKGROUND
     try:
         yield scene
     finally:
@@ -77,20 +83,16 @@ def _scene() -> Iterator[bpy.types.Scene]:
             data = obj.data
             bpy.data.objects.remove(obj)
             bpy.data.batch_remove([data])
+        bpy.data.worlds.remove(scene.world)
         bpy.data.scenes.remove(scene)
 
 
 def _add_pose(scene: bpy.types.Scene, points: FloatArray, tile: Tile) -> None:
     """The triangles of a pose in the camera's own axes: x to the right, y up, z towards it."""
     mesh = bpy.data.meshes.new("pose")
-    faces = tile.pose.mesh.faces
-    mesh.from_pydata(points.tolist(), [], faces.tolist())
+    mesh.from_pydata(points.tolist(), [], tile.pose.mesh.faces.tolist())
     mesh.shade_smooth()
-    colors = np.ones((len(faces), 3, 4), dtype=np.float32)
-    colors[:, :, :3] = palette()[tile.labels[tile.pose.polygon_of]][:, None]
-    attribute = mesh.color_attributes.new(COLORS, "BYTE_COLOR", "CORNER")
-    attribute.data.foreach_set("color_srgb", colors.ravel())
-    mesh.color_attributes.active_color = attribute
+    _paint(mesh, np.repeat(palette()[tile.labels[tile.pose.polygon_of]], 3, axis=0))
     scene.collection.objects.link(bpy.data.objects.new("pose", mesh))
 
 
@@ -99,9 +101,24 @@ def _add_caption(scene: bpy.types.Scene, text: str, place: FloatArray) -> None:
     curve.body = text
     curve.size = CAPTION_SIZE
     curve.align_x = "CENTER"
-    caption = bpy.data.objects.new("caption", curve)
+    letters = bpy.data.objects.new("caption", curve)
+    # Letters take a color only as a mesh.
+    mesh = bpy.data.meshes.new_from_object(letters)
+    bpy.data.objects.remove(letters)
+    bpy.data.curves.remove(curve)
+    _paint(mesh, np.tile(CAPTION_COLOR, (len(mesh.loops), 1)))
+    caption = bpy.data.objects.new("caption", mesh)
     caption.location = (place[0], place[1] - 0.5 + CAPTION_SIZE / 2, 0.0)
     scene.collection.objects.link(caption)
+
+
+def _paint(mesh: bpy.types.Mesh, srgb: FloatArray) -> None:
+    """Give each corner of a mesh one of the (corners, 3) colors."""
+    colors = np.ones((len(mesh.loops), 4), dtype=np.float32)
+    colors[:, :3] = srgb
+    attribute = mesh.color_attributes.new(COLORS, "BYTE_COLOR", "CORNER")
+    attribute.data.foreach_set("color_srgb", colors.ravel())
+    mesh.color_attributes.active_color = attribute
 
 
 def _add_camera(scene: bpy.types.Scene, columns: int, rows: int) -> None:
@@ -124,8 +141,6 @@ def _render(scene: bpy.types.Scene, path: Path, columns: int, rows: int) -> None
     shading = scene.display.shading
     shading.light, shading.color_type = "STUDIO", "VERTEX"
     shading.show_cavity = True
-    shading.background_type, shading.background_color = "VIEWPORT", (0.93, 0.93, 0.94)
-    scene.world = None
     try:
         bpy.ops.render.render(write_still=True, scene=scene.name)
     except RuntimeError as error:

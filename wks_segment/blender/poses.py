@@ -177,7 +177,7 @@ def _read_object(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple
 
 
 def _get(collection: bpy.types.bpy_prop_collection, name: str, width: int, dtype: type) -> NDArray[Any]:
-    values = np.empty(len(collection) * width, dtype=dtype)
+    values: NDArray[Any] = np.empty(len(collection) * width, dtype=dtype)
     collection.foreach_get(name, values)
     return values
 

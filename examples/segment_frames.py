@@ -1,0 +1,68 @@
+"""Learn a character's parts from frames of its animation, in plain Python.
+
+    blender --background --python-exit-code 1 --python examples/segment_frames.py -- walk.glb labelled.blend
+
+With the extension installed, Blender finds SciPy and scikit-learn in it. What the operators do in one call is written
+out here, so that you can change any step: other poses, another model, another use of the labels.
+"""
+
+import importlib
+import sys
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+FRAMES = (1, 8, 15, 22, 29)
+SEGMENTS = 6
+
+
+def wks_segment(part: str) -> Any:
+    """A part of the package, from the installed extension or from this repository."""
+    for name in sys.modules:
+        if name.startswith("bl_ext.") and name.endswith(".wks_segment.wks_segment"):
+            return importlib.import_module(f"{name}.{part}")
+    return importlib.import_module(f"wks_segment.{part}")
+
+
+def triangles_of(obj: bpy.types.Object) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Vertices, triangles and the polygon of each triangle, as the object is seen in this frame."""
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = evaluated.to_mesh()
+    mesh.calc_loop_triangles()
+    vertices = np.array([vertex.co for vertex in mesh.vertices])
+    triangles = np.array([triangle.vertices for triangle in mesh.loop_triangles])
+    polygons = np.array([triangle.polygon_index for triangle in mesh.loop_triangles])
+    evaluated.to_mesh_clear()
+    return vertices, triangles, polygons
+
+
+def main(source: str, target: str) -> None:
+    """Read, learn, label, write, save."""
+    core, labels = wks_segment("core"), wks_segment("blender.labels")
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.import_scene.gltf(filepath=source)
+    obj = max((o for o in bpy.data.objects if o.type == "MESH"), key=lambda o: len(o.data.vertices))
+
+    poses, polygons = [], []
+    for frame in FRAMES:
+        bpy.context.scene.frame_set(frame)
+        vertices, triangles, polygon_of = triangles_of(obj)
+        poses.append(core.TriangleMesh(vertices, triangles))
+        polygons.append(polygon_of)
+
+    model = core.PoseSegmentation(n_segments=SEGMENTS)
+    described = [model.describe(pose) for pose in poses]  # eigenpairs and signatures: what takes the time
+    model.fit(described)
+    component = model.segment_polygons(described, polygons)
+
+    labels.write_labels(obj.data, component, colors=True)
+    model.save(f"{target}.model.json")
+    bpy.ops.wm.save_as_mainfile(filepath=target)
+    for k in range(SEGMENTS):
+        print(f"segment {k}: {np.mean(component == k):.0%} of the faces")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[sys.argv.index("--") + 1 :])
