@@ -163,7 +163,7 @@ def _segment(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
         _save(model, options.model)
     if options.output or options.render:
         _label(model, poses, described, settings, options, report)
-    settings.keep_model(model, report.sentence)
+    settings.keep_model(model, report.facts)
     if options.output:
         files.save_scene(options.output)
     report.warnings += tasks.pose_warnings(poses, from_frames=options.frames is not None)
@@ -180,7 +180,7 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     settings = _settings(options)
     described = tasks.describe(model, poses, report, progress)
     _label(model, poses, described, settings, options, report)
-    settings.keep_model(model, f"{options.model.name}: {model.n_segments} segments")
+    settings.keep_model(model, [f"From {options.model.name}", f"{model.n_segments} segments"])
     if options.output:
         files.save_scene(options.output)
     return _result(options, report)

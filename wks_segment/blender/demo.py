@@ -82,7 +82,7 @@ def run(
         captions = [f"{frame} {'learned' if known else 'unseen'}" for frame, known in zip(frames, learned, strict=True)]
         render_poses([Tile(*of_pose) for of_pose in zip(poses, own, captions, strict=True)], paths["picture"])
     model.save(paths["model"])
-    settings.keep_model(model, f"{character.name}: {report.sentence}")
+    settings.keep_model(model, [f"From {character.name}", *report.facts[:3]])
     files.save_scene(paths["scene"])
     return {
         "poses": [

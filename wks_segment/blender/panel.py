@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import bpy
 
+NO_MODEL = "No model yet:\nselect a character,\nthen Learn and Segment"
+
 
 class WKS_SEGMENT_PT_main(bpy.types.Panel):
     """Poses, segments and the three buttons."""
@@ -67,7 +69,7 @@ class WKS_SEGMENT_PT_model(bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, context.scene.wks_segment
         column = layout.column()
-        for line in (settings.model_summary or "No model yet: select a character, then Learn and Segment").split(": "):
+        for line in (settings.model_summary or NO_MODEL).splitlines():
             column.label(text=line)
         row = layout.row(align=True)
         row.operator("wks_segment.load_model", text="Load", icon="IMPORT")

@@ -98,13 +98,13 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
     )
 
     model: StringProperty(options={"HIDDEN"}, description="The learned model, as JSON")
-    model_summary: StringProperty(options={"HIDDEN"}, description="What the model was learned from")
+    model_summary: StringProperty(options={"HIDDEN"}, description="Lines on what the model was learned from")
 
     def new_model(self) -> PoseSegmentation:
         """An unfitted model with these settings."""
         parameters: dict[str, Any] = {name: getattr(self, name) for name in MODEL_PARAMETERS}
         return PoseSegmentation(**parameters)
 
-    def keep_model(self, model: PoseSegmentation, summary: str) -> None:
-        """Store a fitted model in the scene."""
-        self.model, self.model_summary = model.to_json(), summary
+    def keep_model(self, model: PoseSegmentation, summary: list[str]) -> None:
+        """Store a fitted model in the scene, with a few lines on where it is from."""
+        self.model, self.model_summary = model.to_json(), "\n".join(summary)

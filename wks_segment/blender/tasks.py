@@ -39,11 +39,14 @@ class Report:
         self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
 
     @property
-    def sentence(self) -> str:
-        """One line for a person."""
-        poses = f"{len(self.poses)} pose" + "s" * (len(self.poses) != 1)
-        vertices = sum(pose.mesh.n_vertices for pose in self.poses)
-        return f"{poses}, {vertices:,} vertices, {self.n_segments} segments, {sum(self.seconds.values()):.1f} seconds"
+    def facts(self) -> list[str]:
+        """What a person wants to know, short."""
+        return [
+            f"{len(self.poses)} pose" + "s" * (len(self.poses) != 1),
+            f"{sum(pose.mesh.n_vertices for pose in self.poses):,} vertices",
+            f"{self.n_segments} segments",
+            f"{sum(self.seconds.values()):.1f} seconds",
+        ]
 
 
 def read_training_poses(context: bpy.types.Context, settings: WKSSegmentSettings, report: Report) -> list[Pose]:

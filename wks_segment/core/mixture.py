@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 from sklearn.cluster import KMeans
+from threadpoolctl import threadpool_limits
 
 from .mesh import FloatArray
 
@@ -70,6 +71,7 @@ class GaussianMixture:
         return np.asarray(logsumexp(self.log_densities(samples), axis=1))
 
 
+@threadpool_limits.wrap(limits=1)  # on samples this few, threads cost more than they gain
 def fit_mixture(
     samples: FloatArray,
     sample_weights: FloatArray,

@@ -9,6 +9,7 @@ from scipy.linalg import eigh
 from scipy.sparse import csc_matrix, csr_matrix, diags
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
+from threadpoolctl import threadpool_limits
 
 from .laplacian import stiffness_matrix, unit_area_masses
 from .mesh import FloatArray, IntArray, TriangleMesh
@@ -31,6 +32,8 @@ class SpectrumError(RuntimeError):
     """The eigenpairs could not be computed to the accuracy asked for."""
 
 
+# More BLAS threads on blocks this narrow spend their time waiting for each other.
+@threadpool_limits.wrap(limits=1, user_api="blas")
 def eigenpairs(mesh: TriangleMesh, n_pairs: int = 300, accuracy: Accuracy = "fast") -> tuple[FloatArray, FloatArray]:
     """Compute the first eigenpairs of S φ = λ M φ on the surface scaled to area 1.
 

@@ -33,7 +33,7 @@ class WKS_SEGMENT_OT_learn(bpy.types.Operator):
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         names = list(dict.fromkeys(pose.character.name for pose in poses))
-        settings.keep_model(model, f"{', '.join(names[:3])}{' …' * (len(names) > 3)}: {report.sentence}")
+        settings.keep_model(model, [f"From {', '.join(names[:3])}{' …' * (len(names) > 3)}", *report.facts[:3]])
         if settings.write_colors:
             feedback.show_colors(context)
         return feedback.finish(self, "Learned", report)
