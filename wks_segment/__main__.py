@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import traceback
 
 
 def main() -> None:
@@ -21,6 +22,9 @@ def main() -> None:
         code = blender.command.run(sys.argv[1:])
     except SystemExit as end:  # argparse
         code = int(end.code or 0)
+    except BaseException:
+        traceback.print_exc()
+        code = 1
     blender.unregister()
     sys.stdout.flush()
     sys.stderr.flush()

@@ -1,5 +1,6 @@
-"""Small characters, and what the tests ask of a mesh."""
+"""Small characters, and what the tests ask of a mesh and of a command."""
 
+import json
 from functools import cache
 
 import bmesh
@@ -109,6 +110,7 @@ def limbed_rigged(name="Walker", **options):
 
 def select(*objects):
     """Select objects and nothing else; the first is active."""
+    bpy.context.view_layer.update()
     for obj in bpy.context.view_layer.objects:
         obj.select_set(obj in objects)
     bpy.context.view_layer.objects.active = objects[0] if objects else None
@@ -143,10 +145,10 @@ def snapshot(mesh):
     """All that an artist could miss of a mesh, in a form that can be compared."""
     attributes = {}
     for attribute in mesh.attributes:
-        values = ()
+        values = b""
         if not attribute.name.startswith("."):  # of its own ones Blender 5.0 gives some a wrong type
             prop, width = PROPERTIES.get(attribute.data_type, ("value", 1))
-            values = tuple(numbers(mesh, attribute.name, prop, width).ravel().tolist())
+            values = numbers(mesh, attribute.name, prop, width).tobytes()  # in which NaN equals NaN
         attributes[attribute.name] = (attribute.domain, attribute.data_type, values)
     corners = np.empty(len(mesh.loops), dtype=np.int32)
     mesh.loops.foreach_get("vertex_index", corners)
@@ -183,3 +185,27 @@ def scene_snapshot():
         "frame": (context.scene.frame_current, context.scene.frame_subframe),
         "model": (context.scene.wks_segment.model, context.scene.wks_segment.model_summary),
     }
+
+
+def changes(before, after, path=""):
+    """Where two snapshots differ, as paths."""
+    if isinstance(before, dict) and isinstance(after, dict):
+        keys = sorted(before.keys() | after.keys())
+        return [change for key in keys for change in changes(before.get(key), after.get(key), f"{path}/{key}")]
+    return [] if before == after else [path]
+
+
+class Outcome:
+    """How a command ended: its exit code and what it printed."""
+
+    def __init__(self, code, out, err):
+        self.code, self.out, self.err = code, out, err
+
+    @property
+    def result(self):
+        """The JSON object that it printed, if it printed that and nothing else."""
+        assert self.out.count("\n") == 1, f"not one line on standard output:\n{self.out}"
+        return json.loads(self.out)
+
+    def __repr__(self):
+        return f"exit code {self.code}\nstandard output:\n{self.out}\nstandard error:\n{self.err}"

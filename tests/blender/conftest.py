@@ -5,8 +5,8 @@
 
 import contextlib
 import ctypes
+import ctypes.util
 import importlib.util
-import json
 import os
 import shutil
 import sys
@@ -23,6 +23,9 @@ os.environ["OMP_NUM_THREADS"] = "1"
 HAS_BPY = importlib.util.find_spec("bpy") is not None
 if not HAS_BPY:
     collect_ignore = [path.name for path in Path(__file__).parent.glob("test_*.py") if "zip" not in path.name]
+LIBC = ctypes.cdll.msvcrt if os.name == "nt" else ctypes.CDLL(None)
+STDOUT = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115  # importers keep it
+"""Writes to descriptor 1, as sys.stdout of a real process does and pytest's does not."""
 SESSION = pytest.StashKey[pytest.Session]()
 
 
@@ -47,13 +50,15 @@ def pytest_unconfigure(config):
 
 
 @pytest.fixture(scope="session")
-def extension():
+def extension(tmp_path_factory):
     """The package, registered as Blender does it when the extension is enabled."""
     import wks_segment.blender
 
     wks_segment.blender.register()
     yield wks_segment.blender
     wks_segment.blender.unregister()
+    # pytest would do it as the process ends, but see pytest_unconfigure; later runs keep a locked folder for days.
+    (tmp_path_factory.getbasetemp() / ".lock").unlink(missing_ok=True)
 
 
 @pytest.fixture
@@ -79,40 +84,32 @@ def printed(capfd):
 
     def read():
         sys.stdout.flush()
-        ctypes.CDLL(None).fflush(None)
+        LIBC.fflush(None)
         return capfd.readouterr()
 
     return read
 
 
-class Outcome:
-    """How a command ended: its exit code and what it printed."""
-
-    def __init__(self, code, out, err):
-        self.code, self.out, self.err = code, out, err
-
-    @property
-    def result(self):
-        """The JSON object that it printed, if it printed that and nothing else."""
-        assert self.out.count("\n") == 1, f"not one line on standard output:\n{self.out}"
-        return json.loads(self.out)
-
-    def __repr__(self):
-        return f"exit code {self.code}\nstandard output:\n{self.out}\nstandard error:\n{self.err}"
-
-
 @pytest.fixture
 def command(scene, extension, printed):
     """A function that runs the command line in this process."""
+    from builders import Outcome
 
     def run(*arguments):
         printed()
-        # pytest's own sys.stdout does not write to descriptor 1, as that of a real process does.
-        with open(1, "w", encoding="utf-8", closefd=False) as stdout, contextlib.redirect_stdout(stdout):
+        with contextlib.redirect_stdout(STDOUT):
             try:
                 code = extension.command.run([str(argument) for argument in arguments])
             except SystemExit as end:
                 code = end.code
+            STDOUT.flush()
         return Outcome(code, *printed())
 
     return run
+
+
+@pytest.fixture
+def needs_rendering():
+    """Skips where Blender cannot draw without a window."""
+    if sys.platform == "linux" and not ctypes.util.find_library("EGL"):
+        pytest.skip("Blender draws without a window through EGL, which is not installed (libegl1, libgl1-mesa-dri)")

@@ -22,14 +22,26 @@ class Character:
         armature = armature_of(self.objects[0])
         return self.objects[0].name if len(self.objects) == 1 or armature is None else armature.name
 
-    @property
-    def actions(self) -> list[bpy.types.Action]:
-        """Actions that move the character now: its objects', their shape keys' and their armatures'."""
-        moved: list[bpy.types.ID] = []
+    def frame_ranges(self) -> list[tuple[float, float]]:
+        """First and last frame of each action and unmuted NLA strip that moves the character now."""
+        ranges: list[tuple[float, float]] = []
+        for block in self.animated():
+            data = block.animation_data
+            if data is None:
+                continue
+            if data.action is not None:
+                ranges.append(tuple(data.action.frame_range))
+            for track in data.nla_tracks:
+                if not track.mute:
+                    ranges += [(strip.frame_start, strip.frame_end) for strip in track.strips if not strip.mute]
+        return ranges
+
+    def animated(self) -> list[bpy.types.ID]:
+        """Data-blocks whose animation moves the character: objects, armatures, shape keys."""
+        blocks: dict[bpy.types.ID, None] = {}
         for obj in self.objects:
-            moved += [obj, armature_of(obj), getattr(obj.data.shape_keys, "id_data", None)]
-        data = [block.animation_data for block in moved if block is not None and block.animation_data is not None]
-        return list(dict.fromkeys(d.action for d in data if d.action is not None))
+            blocks |= dict.fromkeys(b for b in (armature_of(obj), obj, obj.data.shape_keys) if b is not None)
+        return list(blocks)
 
 
 def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
@@ -45,25 +57,22 @@ def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
     return None
 
 
-def bone_shapes() -> set[bpy.types.Object]:
-    """Objects that only draw the bones of a rig, as importers add them."""
-    return {
-        bone.custom_shape
-        for obj in bpy.data.objects
-        if obj.type == "ARMATURE" and obj.pose is not None
-        for bone in obj.pose.bones
-        if bone.custom_shape is not None
-    }
-
-
 def mesh_objects(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
     """Those of the objects that hold a mesh and are not there only to draw a bone, by name."""
-    shapes = bone_shapes()
-    return sorted((o for o in objects if o.type == "MESH" and o not in shapes), key=lambda o: o.name)
+    meshes = sorted((obj for obj in objects if obj.type == "MESH"), key=lambda obj: obj.name)
+    return [obj for obj in meshes if not _draws_a_bone(obj)]
+
+
+def _draws_a_bone(obj: bpy.types.Object) -> bool:
+    """Whether an object only shows the bones of a rig, as importers add them: alone, and the shape of a bone."""
+    if obj.parent is not None or obj.modifiers:
+        return False
+    rigs = [other for other in bpy.data.objects if other.type == "ARMATURE" and other.pose is not None]
+    return any(bone.custom_shape == obj for rig in rigs for bone in rig.pose.bones)
 
 
 def group(objects: Sequence[bpy.types.Object], together: bool = False) -> list[Character]:
-    """Characters that mesh objects make up: those on one armature are one, any other is one by itself.
+    """Characters that mesh objects make up: those on one armature or parented to each other are one.
 
     Parameters
     ----------
@@ -86,7 +95,18 @@ def group(objects: Sequence[bpy.types.Object], together: bool = False) -> list[C
             raise UserError(f'"{obj.name}" is in Edit Mode: leave it first (Tab)')
     if together:
         return [Character(tuple(objects))]
-    by_armature: dict[bpy.types.Object, list[bpy.types.Object]] = {}
+    by_body: dict[bpy.types.Object, list[bpy.types.Object]] = {}
     for obj in objects:
-        by_armature.setdefault(armature_of(obj) or obj, []).append(obj)
-    return [Character(tuple(members)) for members in by_armature.values()]
+        by_body.setdefault(_body_of(obj, set(objects)), []).append(obj)
+    return [Character(tuple(members)) for members in by_body.values()]
+
+
+def _body_of(obj: bpy.types.Object, among: set[bpy.types.Object]) -> bpy.types.Object:
+    """What an object belongs to: its armature, the topmost of its parents that is among the objects, or itself."""
+    armature = armature_of(obj)
+    if armature is not None:
+        return armature
+    body, parent = obj, obj.parent
+    while parent is not None:
+        body, parent = (parent if parent in among else body), parent.parent
+    return body if body is obj else _body_of(body, among)

@@ -95,9 +95,9 @@ def _add_poses(parser: argparse.ArgumentParser) -> None:
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
         "--frames", type=_frames, metavar="FIRST:LAST:COUNT",
-        help="take poses from frames of each file's animation; COUNT alone: of its whole action",
+        help="take poses from frames of each file's animation; COUNT: of all of it; --frames=-5:20:3 with a minus",
     )  # fmt: skip
-    where.add_argument("--shape-keys", type=int, metavar="COUNT", help="take poses from shape keys")
+    where.add_argument("--shape-keys", type=_within(int, 1, 1000), metavar="COUNT", help="take poses from shape keys")
     parser.add_argument("--action", help="name of the action to take the frames from")
     parser.add_argument(
         "--object", action="append", metavar="NAME", help="use this object only; may be given several times"
@@ -163,6 +163,7 @@ def _segment(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
         _save(model, options.model)
     if options.output or options.render:
         _label(model, poses, described, settings, options, report)
+        report.warnings += tasks.segment_warnings(model, report)
     settings.keep_model(model, report.facts)
     if options.output:
         files.save_scene(options.output)
@@ -188,8 +189,12 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
 
 def _demo(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     if options.input:
-        character = group(mesh_objects(files.open_files([options.input])[0]), together=True)[0]
-        _choose_action([character], options.action)
+        characters = _characters(options.input, files.open_files([options.input])[0], None)
+        _choose_action(characters, options.action)
+        moving = [character for character in characters if character.frame_ranges()] or characters
+        if len(moving) > 1:
+            raise UserError(f"{options.input}: there are {len(moving)} characters in it; the demo takes one")
+        character = moving[0]
     else:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         character = demo.creature(bpy.context)
@@ -201,6 +206,8 @@ def _check_outputs(options: argparse.Namespace) -> None:
     if options.output:
         files.check_output(options.output)
     if options.render:
+        if options.render.suffix.lower() != ".png":
+            raise UserError(f"{options.render}: a picture is written as .png")
         files.check_folder(options.render)
 
 
@@ -213,7 +220,7 @@ def _read(options: argparse.Namespace, report: Report) -> list[Pose]:
             _choose_action(characters, options.action)
             for character in characters:
                 if options.shape_keys is not None:
-                    poses += reader.read_shape_keys(bpy.context, character.objects[0], options.shape_keys)
+                    poses += reader.read_shape_keys(bpy.context, character, options.shape_keys)
                 elif options.frames is not None:
                     first, last, count = options.frames
                     if first is None or last is None:
@@ -229,7 +236,11 @@ def _read(options: argparse.Namespace, report: Report) -> list[Pose]:
 
 def _characters(path: Path, objects: list[bpy.types.Object], names: Sequence[str] | None) -> list[Character]:
     """A .blend file can hold several characters; a file of any other format holds one."""
-    found = mesh_objects(objects)
+    scene = mesh_objects(objects)
+    # What Blender does not evaluate has no pose: it would come without its modifiers, the same in every frame.
+    found = [obj for obj in scene if obj.name in bpy.context.view_layer.objects and not obj.hide_viewport]
+    if scene and not found:
+        raise UserError(f"{path}: all mesh objects in it are disabled in viewports, or their collections are excluded")
     if names:
         missing = set(names) - {obj.name for obj in found}
         if missing:
@@ -249,14 +260,22 @@ def _choose_action(characters: Sequence[Character], name: str | None) -> None:
         known = ", ".join(a.name for a in bpy.data.actions) or "none"
         raise UserError(f'There is no action named "{name}"; there are: {known}')
     for character in characters:
-        for obj in character.objects:
-            (armature_of(obj) or obj).animation_data_create().action = action
+        for block in {armature_of(obj) or obj for obj in character.objects}:
+            data = block.animation_data_create()
+            data.action = action
+            # From 4.4 on an action has slots, and one of another name is not taken by itself.
+            if getattr(data, "action_slot", action) is None:
+                if not data.action_suitable_slots:
+                    raise UserError(f'The action "{name}" does not fit "{block.name}"')
+                data.action_slot = data.action_suitable_slots[0]
 
 
 def _settings(options: argparse.Namespace) -> WKSSegmentSettings:
-    """The settings of the scene, with what the command line says."""
+    """Default settings, whatever the file holds, with what the command line says."""
     settings: WKSSegmentSettings = bpy.context.scene.wks_segment
+    settings.property_unset("write_colors")
     for name in OPTIONS.values():
+        settings.property_unset(name)
         value = getattr(options, name, None)
         if value is not None:
             setattr(settings, name, value)
@@ -289,7 +308,7 @@ def _load(path: Path) -> PoseSegmentation:
     except FileNotFoundError:
         raise UserError(f"{path}: there is no such file") from None
     except (ValueError, OSError) as error:
-        raise UserError(f"{path}: {error}") from error
+        raise UserError(f"{path}: {getattr(error, 'strerror', None) or error}") from error
 
 
 def _result(options: argparse.Namespace, report: Report) -> dict[str, Any]:

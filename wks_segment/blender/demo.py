@@ -53,6 +53,9 @@ def run(
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UserError(f"{path.parent}: the folder could not be made: {error.strerror}") from error
+    paths = {kind: path.with_name(path.name + suffix) for kind, suffix in SUFFIXES.items()}
+    for written in paths.values():
+        files.check_folder(written)
     report = Report([])
     frames = reader.own_frames(context.scene, character, n_learned + n_unseen)
     if len(frames) < n_learned + n_unseen:
@@ -76,12 +79,14 @@ def run(
     own = [labels_of[pose.name] for pose in poses]
     agreement = agreements(own, learned, [polygon_areas(pose, len(own[0])) for pose in poses])
 
-    paths = {kind: path.with_name(path.name + suffix) for kind, suffix in SUFFIXES.items()}
     progress("Picture", 0.95)
     with report.stage("render"):
         captions = [f"{frame} {'learned' if known else 'unseen'}" for frame, known in zip(frames, learned, strict=True)]
         render_poses([Tile(*of_pose) for of_pose in zip(poses, own, captions, strict=True)], paths["picture"])
-    model.save(paths["model"])
+    try:
+        model.save(paths["model"])
+    except OSError as error:
+        raise UserError(f"{paths['model']}: the model could not be written: {error.strerror or error}") from error
     settings.keep_model(model, [f"From {character.name}", *report.facts[:3]])
     files.save_scene(paths["scene"])
     return {

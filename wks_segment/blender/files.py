@@ -59,6 +59,8 @@ def open_files(paths: list[Path]) -> list[list[bpy.types.Object]]:
             raise UserError(f"{path}: unknown format; known are {', '.join(IMPORTERS)}")
     if len(paths) == 1 and paths[0].suffix.lower() == ".blend":
         _try(lambda path: bpy.ops.wm.open_mainfile(filepath=path, load_ui=False), paths[0])
+        if bpy.context.object is not None and bpy.context.object.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
         return [list(bpy.context.scene.objects)]
     # Not read_factory_settings: that would disable the extension which this runs in.
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.mesh import IntArray
-from .palette import palette
+from .palette import colors_of
 
 FACES = "wks_segment"
 VERTICES = "wks_segment_vertex"
 COLORS = "wks_segment_color"
 OWN_MATERIALS = "wks_segment_own_material"
 """Face attribute that keeps the material index of each face from before ours."""
-NOTE = "wks_segment"
+NOTE = "wks_segment_note"
 """Custom property of a mesh: which attributes are ours, and what was active before."""
 COMPONENT = "wks_segment_component"
 """Custom property of our materials: the component that they show."""
@@ -29,45 +29,53 @@ def write_labels(mesh: bpy.types.Mesh, labels: IntArray, colors: bool = True, ma
     behind the mesh's own. Attributes of the user that happen to have our names are left alone: ours get a number.
     """
     clear_labels(mesh)
-    note: dict[str, str | int] = {
-        "faces": _write_ints(mesh, FACES, "FACE", labels),
-        "vertices": _write_ints(mesh, VERTICES, "POINT", _at_vertices(mesh, labels)),
-    }
+    # The note comes first and grows with what is written, so that Clear also mends a run that broke off.
+    mesh[NOTE] = {}
+    _write_ints(mesh, "faces", FACES, "FACE", labels)
+    _write_ints(mesh, "vertices", VERTICES, "POINT", _at_vertices(mesh, labels))
     if colors:
         active = mesh.color_attributes.active_color
-        note["active_color"] = active.name if active is not None else ""
-        note["render_color"] = mesh.color_attributes.render_color_index
-        note["colors"] = _write_colors(mesh, labels)
+        mesh[NOTE]["active_color"] = active.name if active is not None else ""
+        _write_colors(mesh, labels)
     if materials:
+        mesh[NOTE]["had_material_index"] = "material_index" in mesh.attributes
+        mesh[NOTE]["first_slot"] = len(mesh.materials)
         before = np.empty(len(mesh.polygons), dtype=np.int32)
         mesh.polygons.foreach_get("material_index", before)
-        note["own_materials"] = _write_ints(mesh, OWN_MATERIALS, "FACE", before)
+        _write_ints(mesh, "own_materials", OWN_MATERIALS, "FACE", before)
         _write_materials(mesh, labels)
-    mesh[NOTE] = note
     mesh.update()
 
 
 def clear_labels(mesh: bpy.types.Mesh) -> bool:
     """Remove exactly what `write_labels` wrote and restore what was there; False if there was nothing."""
-    if NOTE not in mesh:
+    if not has_labels(mesh):
         return False
     note = mesh[NOTE].to_dict()
-    if "own_materials" in note:
-        _restore_materials(mesh, note["own_materials"])
+    if "first_slot" in note:
+        _restore_materials(mesh, note)
     for key in ("faces", "vertices", "colors", "own_materials"):
         attribute = mesh.attributes.get(note.get(key, ""))
         if attribute is not None:
             mesh.attributes.remove(attribute)
-    if "colors" in note:
-        _restore_active_color(mesh, note["active_color"], note["render_color"])
+    if note.get("had_material_index") is False and "material_index" in mesh.attributes:
+        mesh.attributes.remove(mesh.attributes["material_index"])
+    active = mesh.color_attributes.get(note.get("active_color", ""))
+    if active is not None:
+        mesh.color_attributes.active_color = active
     del mesh[NOTE]
     mesh.update()
     return True
 
 
+def has_labels(mesh: bpy.types.Mesh) -> bool:
+    """Whether a mesh carries anything that `write_labels` wrote."""
+    return NOTE in mesh and hasattr(mesh[NOTE], "to_dict")
+
+
 def read_labels(mesh: bpy.types.Mesh) -> IntArray | None:
     """(p,) components of the polygons that were written to a mesh; None if there are none."""
-    attribute = mesh.attributes.get(mesh[NOTE]["faces"]) if NOTE in mesh else None
+    attribute = mesh.attributes.get(mesh[NOTE].get("faces", "")) if has_labels(mesh) else None
     if attribute is None:
         return None
     labels = np.empty(len(mesh.polygons), dtype=np.int32)
@@ -75,11 +83,11 @@ def read_labels(mesh: bpy.types.Mesh) -> IntArray | None:
     return labels.astype(np.int64)
 
 
-def _write_ints(mesh: bpy.types.Mesh, name: str, domain: str, values: NDArray[np.integer[Any]]) -> str:
-    """Add an int attribute; the name that it got, since a name that is taken gets a number."""
+def _write_ints(mesh: bpy.types.Mesh, key: str, name: str, domain: str, values: NDArray[np.integer[Any]]) -> None:
+    """Add an int attribute and note the name that it got: a name that is taken gets a number."""
     attribute = mesh.attributes.new(name, "INT", domain)
+    mesh[NOTE][key] = attribute.name
     attribute.data.foreach_set("value", np.asarray(values, dtype=np.int32))
-    return attribute.name
 
 
 def _at_vertices(mesh: bpy.types.Mesh, labels: IntArray) -> IntArray:
@@ -97,23 +105,15 @@ def _at_corners(mesh: bpy.types.Mesh, labels: IntArray) -> IntArray:
     return np.repeat(labels, corners)
 
 
-def _write_colors(mesh: bpy.types.Mesh, labels: IntArray) -> str:
+def _write_colors(mesh: bpy.types.Mesh, labels: IntArray) -> None:
     # Corners, since colors of the FACE domain cannot be shown, and those of points would blend.
     attribute = mesh.color_attributes.new(COLORS, "BYTE_COLOR", "CORNER")
+    mesh[NOTE]["colors"] = attribute.name
     colors = np.ones((len(mesh.loops), 4), dtype=np.float32)
-    colors[:, :3] = palette()[_at_corners(mesh, labels)]
+    colors[:, :3] = colors_of(_at_corners(mesh, labels))
     attribute.data.foreach_set("color_srgb", colors.ravel())
+    # What is rendered stays the user's: only what is shown in solid view changes.
     mesh.color_attributes.active_color = attribute
-    mesh.color_attributes.render_color_index = mesh.color_attributes.find(attribute.name)
-    return attribute.name
-
-
-def _restore_active_color(mesh: bpy.types.Mesh, active: str, render_index: int) -> None:
-    attribute = mesh.color_attributes.get(active)
-    if attribute is not None:
-        mesh.color_attributes.active_color = attribute
-    if 0 <= render_index < len(mesh.color_attributes):
-        mesh.color_attributes.render_color_index = render_index
 
 
 def _write_materials(mesh: bpy.types.Mesh, labels: IntArray) -> None:
@@ -121,6 +121,7 @@ def _write_materials(mesh: bpy.types.Mesh, labels: IntArray) -> None:
     for component in np.unique(labels).tolist():
         slot[component] = len(mesh.materials)
         mesh.materials.append(_material(component))
+    mesh[NOTE]["last_slot"] = len(mesh.materials)
     mesh.polygons.foreach_set("material_index", slot[labels])
 
 
@@ -131,7 +132,7 @@ def _material(component: int) -> bpy.types.Material:
             return material
     material = bpy.data.materials.new(f"Segment {component + 1}")
     material[COMPONENT] = component
-    srgb = palette()[component]
+    srgb = colors_of(np.array([component]))[0]
     linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
     color = (*linear.tolist(), 1.0)
     material.diffuse_color = color
@@ -141,15 +142,23 @@ def _material(component: int) -> bpy.types.Material:
     return material
 
 
-def _restore_materials(mesh: bpy.types.Mesh, own: str) -> None:
-    attribute = mesh.attributes.get(own)
-    if attribute is not None:
-        before = np.empty(len(mesh.polygons), dtype=np.int32)
-        attribute.data.foreach_get("value", before)
-        mesh.polygons.foreach_set("material_index", before)
-    for index in reversed(range(len(mesh.materials))):
-        material = mesh.materials[index]
-        if material is not None and COMPONENT in material:
-            mesh.materials.pop(index=index)
-            if material.users == 0:
-                bpy.data.materials.remove(material)
+def _restore_materials(mesh: bpy.types.Mesh, note: dict[str, Any]) -> None:
+    """Take our slots out, and give faces that still use them their own material back."""
+    first, last = note["first_slot"], note.get("last_slot", note["first_slot"])
+    ours = [
+        i for i, m in enumerate(mesh.materials) if first <= i < last and m is not None and COMPONENT in m
+    ]  # fmt: skip
+    now = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.polygons.foreach_get("material_index", now)
+    before = mesh.attributes.get(note.get("own_materials", ""))
+    own = np.zeros_like(now)
+    if before is not None:
+        before.data.foreach_get("value", own)
+    # Slots that the user added behind ours move up.
+    moved = now - np.searchsorted(ours, now).astype(np.int32)
+    restored = np.where(np.isin(now, ours), own, moved)
+    for index in reversed(ours):
+        material = mesh.materials.pop(index=index)
+        if material.users == 0:
+            bpy.data.materials.remove(material)
+    mesh.polygons.foreach_set("material_index", restored.astype(np.int32))

@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from ..core.mesh import FloatArray
+from ..core.mesh import FloatArray, IntArray
 
 MAX_COLOURS = 64
 STEPS = 24
@@ -54,6 +54,11 @@ def palette() -> FloatArray:
     colours = np.stack(chosen)
     colours.setflags(write=False)
     return colours
+
+
+def colors_of(components: IntArray) -> FloatArray:
+    """(…, 3) sRGB color of each component; they repeat after MAX_COLOURS."""
+    return palette()[components % MAX_COLOURS]
 
 
 def oklab(srgb: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ NO_MODEL = "No model yet:\nselect a character,\nthen Learn and Segment"
 
 
 class WKS_SEGMENT_PT_main(bpy.types.Panel):
-    """Poses, segments and the three buttons."""
+    """Poses, the settings of the paper and the three buttons."""
 
     bl_label = "WKS Segment"
     bl_idname = "WKS_SEGMENT_PT_main"
@@ -30,7 +30,9 @@ class WKS_SEGMENT_PT_main(bpy.types.Panel):
             if settings.use_frame_range:
                 column.prop(settings, "frame_first")
                 column.prop(settings, "frame_last")
-        layout.prop(settings, "n_segments")
+        column = layout.column()
+        for name in ("n_segments", "n_eigenpairs", "n_energies", "covariance_type", "random_state"):
+            column.prop(settings, name)
 
         column = layout.column(align=True)
         column.scale_y = 1.4
@@ -77,7 +79,7 @@ class WKS_SEGMENT_PT_model(bpy.types.Panel):
 
 
 class WKS_SEGMENT_PT_advanced(bpy.types.Panel):
-    """The settings of the paper."""
+    """What most users leave as it is."""
 
     bl_label = "Advanced"
     bl_parent_id = "WKS_SEGMENT_PT_main"
@@ -90,8 +92,8 @@ class WKS_SEGMENT_PT_advanced(bpy.types.Panel):
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column()
-        for name in ("random_state", "min_share", "n_eigenpairs", "n_energies", "covariance_type", "scaling"):
-            column.prop(settings, name)
+        column.prop(settings, "min_share")
+        column.prop(settings, "scaling")
 
 
 CLASSES = (WKS_SEGMENT_PT_main, WKS_SEGMENT_PT_outputs, WKS_SEGMENT_PT_model, WKS_SEGMENT_PT_advanced)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,7 +16,7 @@ from mathutils import Matrix, Vector
 
 from ..core.mesh import FloatArray, IntArray
 from .errors import UserError
-from .palette import palette
+from .palette import colors_of
 from .poses import Pose
 
 TILE = 480
@@ -92,8 +94,14 @@ def _add_pose(scene: bpy.types.Scene, points: FloatArray, tile: Tile) -> None:
     mesh = bpy.data.meshes.new("pose")
     mesh.from_pydata(points.tolist(), [], tile.pose.mesh.faces.tolist())
     mesh.shade_smooth()
-    _paint(mesh, np.repeat(palette()[tile.labels[tile.pose.polygon_of]], 3, axis=0))
+    _paint(mesh, np.repeat(_triangle_colors(tile), 3, axis=0))
     scene.collection.objects.link(bpy.data.objects.new("pose", mesh))
+
+
+def _triangle_colors(tile: Tile) -> FloatArray:
+    """(m, 3) color of each triangle; grey where it is of no polygon of the character's own."""
+    polygon_of = tile.pose.polygon_of
+    return np.where(polygon_of[:, None] < 0, 0.6, colors_of(tile.labels[polygon_of]))
 
 
 def _add_caption(scene: bpy.types.Scene, text: str, place: FloatArray) -> None:
@@ -136,7 +144,9 @@ def _render(scene: bpy.types.Scene, path: Path, columns: int, rows: int) -> None
     scene.render.resolution_x, scene.render.resolution_y = TILE * columns, TILE * rows
     scene.render.resolution_percentage = 100
     scene.render.image_settings.file_format = "PNG"
-    scene.render.filepath = str(path.resolve())
+    # A plain name, since Blender takes braces for templates and adds a suffix that it misses.
+    temporary = Path(tempfile.mkdtemp()) / "picture.png"
+    scene.render.filepath = str(temporary)
     scene.view_settings.view_transform = "Standard"
     shading = scene.display.shading
     shading.light, shading.color_type = "STUDIO", "VERTEX"
@@ -144,6 +154,10 @@ def _render(scene: bpy.types.Scene, path: Path, columns: int, rows: int) -> None
     try:
         bpy.ops.render.render(write_still=True, scene=scene.name)
     except RuntimeError as error:
-        raise UserError(f"The picture {path} could not be rendered: {error}") from error
-    if not path.is_file():
-        raise UserError(f"The picture {path} could not be written: is its folder there, and may you write to it?")
+        raise UserError(f"{path}: the picture could not be rendered: {error}") from error
+    try:
+        shutil.move(temporary, path)
+    except OSError as error:
+        raise UserError(f"{path}: the picture could not be written: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(temporary.parent, ignore_errors=True)

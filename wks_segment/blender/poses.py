@@ -41,6 +41,7 @@ class Pose:
         All objects of the character as they are seen, in world space.
     polygon_of : (m,) int array
         The polygon that each triangle comes from; the polygons of all objects are numbered one object after another.
+        -1: a modifier made it of nothing of the character's own.
     """
 
     name: str
@@ -51,7 +52,15 @@ class Pose:
     def is_like(self, other: Pose) -> bool:
         """Whether the other pose is the same surface at the same place."""
         a, b = self.mesh.vertices, other.mesh.vertices
-        return a.shape == b.shape and bool(np.abs(a - b).max() <= SAME_SURFACE * np.ptp(a, axis=0).max())
+        return (
+            self.is_mesh_of(other)
+            and bool(np.abs(a - b).max() <= SAME_SURFACE * np.ptp(a, axis=0).max())
+            and np.array_equal(self.polygon_of, other.polygon_of)
+        )
+
+    def is_mesh_of(self, other: Pose) -> bool:
+        """Whether the other pose has the same triangles between as many vertices."""
+        return self.mesh.n_vertices == other.mesh.n_vertices and np.array_equal(self.mesh.faces, other.mesh.faces)
 
 
 def polygon_ranges(character: Character) -> list[tuple[bpy.types.Object, slice]]:
@@ -80,34 +89,40 @@ def read_frames(context: bpy.types.Context, character: Character, frames: Sequen
         scene.frame_set(before, subframe=subframe)
 
 
-def read_shape_keys(context: bpy.types.Context, obj: bpy.types.Object, count: int) -> list[Pose]:
-    """One object in its shape keys, at most `count` of them, evenly chosen; each alone at its full value.
+def read_shape_keys(context: bpy.types.Context, character: Character, count: int) -> list[Pose]:
+    """A character in its shape keys, at most `count` of them, evenly chosen; each alone at its full value.
+
+    A key moves all objects of the character that have one of its name; the others show their basis.
 
     Raises
     ------
     UserError
-        If the object has no shape keys beside the basis.
+        If there are no shape keys beside the basis, or all are muted.
     """
-    keys = obj.data.shape_keys
-    if keys is None or len(keys.key_blocks) < 2:
-        raise UserError(f'"{obj.name}" has no shape keys: add some, or take the poses from elsewhere')
-    usable = [i for i, block in enumerate(keys.key_blocks) if not block.mute]
-    chosen = [usable[i] for i in evenly(0, len(usable) - 1, count)]
-    before, pinned = obj.active_shape_key_index, obj.show_only_shape_key
+    keyed = [obj for obj in character.objects if obj.data.shape_keys is not None]
+    names = list(
+        dict.fromkeys(block.name for obj in keyed for block in obj.data.shape_keys.key_blocks if not block.mute)
+    )
+    if len(names) < 2:
+        raise UserError(
+            f'"{character.name}" has no shape keys that are not muted: add some, or take poses from elsewhere'
+        )
+    before = [(obj, obj.active_shape_key_index, obj.show_only_shape_key) for obj in keyed]
     try:
         poses = []
-        obj.show_only_shape_key = True
-        for index in chosen:
-            obj.active_shape_key_index = index
-            name = f"{obj.name}, {keys.key_blocks[index].name}"
-            poses.append(read_pose(context, Character((obj,)), name))
+        for name in (names[i] for i in evenly(0, len(names) - 1, count)):
+            for obj in keyed:
+                obj.show_only_shape_key = True
+                obj.active_shape_key_index = max(obj.data.shape_keys.key_blocks.find(name), 0)
+            poses.append(read_pose(context, character, f"{character.name}, {name}"))
         return poses
     finally:
-        obj.active_shape_key_index, obj.show_only_shape_key = before, pinned
+        for obj, active, pinned in before:
+            obj.active_shape_key_index, obj.show_only_shape_key = active, pinned
 
 
 def evenly(first: int, last: int, count: int) -> list[int]:
-    """At most `count` different whole numbers from first to last, in equal steps, both ends among them."""
+    """At most `count` different whole numbers from first to last, in equal steps from end to end."""
     return np.unique(np.linspace(first, last, max(count, 1)).round().astype(int)).tolist()
 
 
@@ -116,7 +131,7 @@ def own_frames(scene: bpy.types.Scene, character: Character, count: int) -> list
 
     From the middles of equal spans, since the first and the last frame of a cycle are the same pose.
     """
-    ranges = [tuple(action.frame_range) for action in character.actions] or [(scene.frame_start, scene.frame_end)]
+    ranges = character.frame_ranges() or [(scene.frame_start, scene.frame_end)]
     first, last = min(first for first, _ in ranges), max(last for _, last in ranges)
     middles = first + (np.arange(count) + 0.5) * (last - first) / count
     return np.unique(middles.round().astype(int)).tolist()
@@ -134,28 +149,30 @@ def read_pose(context: bpy.types.Context, character: Character, name: str) -> Po
     triangles: list[IntArray] = []
     owners: list[IntArray] = []
     n_vertices = 0
-    with _marked_origins(context, character):
+    with _marked_origins(character) as origins:
         depsgraph = context.evaluated_depsgraph_get()
         for obj, polygons in polygon_ranges(character):
-            points, faces, polygon_of = _read_object(obj, depsgraph)
+            points, faces, polygon_of = _read_object(obj, depsgraph, origins.get(obj.data))
             vertices.append(points)
             triangles.append(faces + n_vertices)
-            owners.append(polygon_of + polygons.start)
+            owners.append(np.where(polygon_of < 0, -1, polygon_of + polygons.start))
             n_vertices += len(points)
-    faces = np.concatenate(triangles)
-    if not len(faces):
+    faces, polygon_of = np.concatenate(triangles), np.concatenate(owners)
+    proper = ~repeats_a_vertex(faces)
+    if not (proper.any() and (polygon_of >= 0).any()):
         names = ", ".join(f'"{obj.name}"' for obj in character.objects)
         raise UserError(f"{names} has no faces: there is no surface to find parts on")
-    proper = ~repeats_a_vertex(faces)
     try:
         mesh = TriangleMesh(np.concatenate(vertices), faces[proper])
     except ValueError as error:
         raise UserError(f'"{name}": {error}') from error
-    return Pose(name, character, mesh, np.concatenate(owners)[proper])
+    return Pose(name, character, mesh, polygon_of[proper])
 
 
-def _read_object(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[FloatArray, IntArray, IntArray]:
-    """Vertices in world space, triangles, and the polygon of the object's own mesh that each comes from."""
+def _read_object(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, origin_name: str | None
+) -> tuple[FloatArray, IntArray, IntArray]:
+    """Vertices in world space, triangles, and the polygon of the object's own mesh that each comes from (-1: none)."""
     evaluated = obj.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
@@ -163,16 +180,19 @@ def _read_object(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple
         vertices = _get(mesh.vertices, "co", 3, np.float32).reshape(-1, 3)
         triangles = _get(mesh.loop_triangles, "vertices", 3, np.int32).reshape(-1, 3)
         polygon_of = _get(mesh.loop_triangles, "polygon_index", 1, np.int32)
-        origin = mesh.attributes.get(ORIGIN)
-        if origin is not None:
-            polygon_of = _get(origin.data, "value", 1, np.int32)[polygon_of]
-        elif len(mesh.polygons) != len(obj.data.polygons):
-            raise UserError(
-                f'"{obj.name}": a modifier makes faces without a trace of origin (as Remesh): apply it, or turn it off'
-            )
+        if origin_name is not None:
+            origin = mesh.attributes.get(origin_name)
+            if origin is None:
+                raise UserError(
+                    f'"{obj.name}": a modifier makes faces and hides of what (as Remesh): apply it, or turn it off'
+                )
+            polygon_of = _get(origin.data, "value", 1, np.int32)[polygon_of] - 1
         world = np.array(evaluated.matrix_world, dtype=np.float64)
     finally:
         evaluated.to_mesh_clear()
+    bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+    if bad.size:
+        raise UserError(f'"{obj.name}": vertex {bad[0]} has a coordinate that is not finite ({bad.size} such vertices)')
     return vertices @ world[:3, :3].T + world[:3, 3], triangles.astype(np.int64), polygon_of.astype(np.int64)
 
 
@@ -183,17 +203,20 @@ def _get(collection: bpy.types.bpy_prop_collection, name: str, width: int, dtype
 
 
 @contextmanager
-def _marked_origins(context: bpy.types.Context, character: Character) -> Iterator[None]:
-    """While it lasts, objects whose modifiers may make faces carry the number of each face as an attribute."""
+def _marked_origins(character: Character) -> Iterator[dict[bpy.types.Mesh, str]]:
+    """While it lasts, meshes whose modifiers may make faces carry the number of each face, from 1, as an attribute.
+
+    From 1, since faces that a modifier takes from elsewhere get 0. Gives the name of the attribute for each mesh.
+    """
     meshes = {obj.data for obj in character.objects if any(m.type not in DEFORMING for m in obj.modifiers)}
+    names: dict[bpy.types.Mesh, str] = {}
     try:
         for mesh in meshes:
             origin = mesh.attributes.new(ORIGIN, "INT", "FACE")
-            origin.data.foreach_set("value", np.arange(len(mesh.polygons), dtype=np.int32))
+            names[mesh] = origin.name
+            origin.data.foreach_set("value", np.arange(1, len(mesh.polygons) + 1, dtype=np.int32))
             mesh.update_tag()
-        yield
+        yield names
     finally:
-        for mesh in meshes:
-            origin = mesh.attributes.get(ORIGIN)
-            if origin is not None:
-                mesh.attributes.remove(origin)
+        for mesh, name in names.items():
+            mesh.attributes.remove(mesh.attributes[name])

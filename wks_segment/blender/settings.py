@@ -27,8 +27,12 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
                 "Selected Objects",
                 "Each selected mesh object is a pose. Objects on one armature are one pose",
             ),
-            ("FRAMES", "Animation Frames", "Frames of the selected character's animation"),
-            ("SHAPE_KEYS", "Shape Keys", "Shape keys of the active object, each at its full value"),
+            (
+                "FRAMES",
+                "Animation Frames",
+                "Frames of the active character's animation. What is not keyed is lost, as in playback",
+            ),
+            ("SHAPE_KEYS", "Shape Keys", "Shape keys of the active character, each at its full value"),
         ],
         default="FRAMES",
     )
@@ -58,7 +62,7 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         default=300, min=20, max=1000, soft_min=50, soft_max=500,
     )  # fmt: skip
     n_energies: IntProperty(
-        name="Energies", description="Length of the signature of a vertex", default=100, min=10, max=500, soft_max=200
+        name="Energies", description="Length of the signature of a vertex", default=100, min=10, max=200
     )
     covariance_type: EnumProperty(
         name="Covariance",

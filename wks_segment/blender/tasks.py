@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
+from scipy.spatial import cKDTree
 
-from ..core import PoseSegmentation, PoseSignature, SpectrumError
+from ..core import PoseSegmentation, PoseSignature, SpectrumError, weld
 from ..core.mesh import IntArray
 from . import poses as reader
 from .characters import Character, group, mesh_objects
@@ -57,28 +58,35 @@ def read_training_poses(context: bpy.types.Context, settings: WKSSegmentSettings
     UserError
         If there are none there, or they cannot be used.
     """
-    selected = mesh_objects(context.selected_objects)
+    characters = group(mesh_objects(context.selected_objects))
     with report.stage("read"):
-        if settings.source == "SHAPE_KEYS":
-            active = context.active_object
-            if active is None or active.type != "MESH":
-                raise UserError("No active mesh object: click the object whose shape keys are the poses")
-            group([active])
-            poses = reader.read_shape_keys(context, active, settings.pose_count)
-        elif settings.source == "FRAMES":
-            characters = group(selected)
-            if len(characters) > 1:
-                raise UserError(
-                    f"{len(characters)} characters are selected: select one to take frames of, "
-                    "or join them under one armature"
-                )
-            frames = chosen_frames(context.scene, characters[0], settings)
-            poses = reader.read_frames(context, characters[0], frames)
+        if settings.source == "OBJECTS":
+            poses = reader.read_objects(context, characters)
         else:
-            poses = reader.read_objects(context, group(selected))
+            character = active_character(context, characters)
+            if settings.source == "SHAPE_KEYS":
+                poses = reader.read_shape_keys(context, character, settings.pose_count)
+            else:
+                frames = chosen_frames(context.scene, character, settings)
+                poses = reader.read_frames(context, character, frames)
     report.poses = poses
     report.warnings += pose_warnings(poses, settings.source == "FRAMES")
     return poses
+
+
+def active_character(context: bpy.types.Context, characters: Sequence[Character]) -> Character:
+    """The one among the selected characters that the active object is of, or the only one.
+
+    Raises
+    ------
+    UserError
+        If there are several and the active object is of none.
+    """
+    for character in characters:
+        if context.active_object in character.objects or len(characters) == 1:
+            return character
+    names = ", ".join(character.name for character in characters[:5])
+    raise UserError(f"{len(characters)} characters are selected ({names}): click the one whose poses are meant")
 
 
 def chosen_frames(scene: bpy.types.Scene, character: Character, settings: WKSSegmentSettings) -> list[int]:
@@ -108,6 +116,12 @@ def learn(
     UserError
         If the core refuses a pose or the settings; the message names it.
     """
+    most = max(int(pose.polygon_of.max()) + 1 for pose in poses)
+    if settings.n_segments > most:
+        raise UserError(
+            f'"{poses[0].character.name}" has {most} faces, too few for {settings.n_segments} segments: '
+            "take fewer segments, or subdivide it"
+        )
     model = settings.new_model()
     described = describe(model, poses, report, progress, share=0.9)
     with report.stage("mixture"):
@@ -130,7 +144,9 @@ def describe(
         twin = next((j for j in range(i) if pose.is_like(poses[j])), None)
         with report.stage("signature"):
             try:
-                described.append(model.describe(pose.mesh) if twin is None else described[twin])
+                # One surface in all poses of a mesh, also where pieces of it meet in some.
+                same_mesh = [other.mesh for other in poses if pose.is_mesh_of(other)]
+                described.append(model.describe(pose.mesh, weld(*same_mesh)) if twin is None else described[twin])
             except (ValueError, SpectrumError) as error:
                 raise UserError(f'"{pose.name}": {error}') from error
     return described
@@ -140,17 +156,17 @@ def label(
     model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[PoseSignature],
     settings: WKSSegmentSettings, report: Report,
 ) -> dict[Character, IntArray]:  # fmt: skip
-    """Components of each character's polygons, agreed on by all of its poses."""
+    """Components of each character's polygons, agreed on by all of its poses, and by all objects that share a mesh."""
     labels: dict[Character, IntArray] = {}
     with report.stage("label"):
-        for character in dict.fromkeys(pose.character for pose in poses):
-            mine = [i for i, pose in enumerate(poses) if pose.character == character]
-            labels[character] = _filled(
-                model.segment_polygons(
-                    [described[i] for i in mine], [poses[i].polygon_of for i in mine], settings.min_share / 100
-                ),
-                poses[mine[0]],
+        meshes = [tuple(obj.data for obj in pose.character.objects) for pose in poses]
+        for mesh in dict.fromkeys(meshes):
+            mine = [i for i, other in enumerate(meshes) if other == mesh]
+            found = model.segment_polygons(
+                [described[i] for i in mine], [poses[i].polygon_of for i in mine], settings.min_share / 100
             )
+            found = filled(found, poses[mine[0]].character)
+            labels |= {poses[i].character: found for i in mine}
     report.n_segments = len(np.unique(np.concatenate(list(labels.values()))))
     return labels
 
@@ -174,10 +190,26 @@ def stored_model(settings: WKSSegmentSettings) -> PoseSegmentation:
         raise UserError(f"The model in this file cannot be used: {error}") from error
 
 
-def _filled(labels: IntArray, pose: Pose) -> IntArray:
-    """Labels for all polygons of a character: those that are not seen (masked out) take 0 behind the last one."""
-    missing = reader.polygon_ranges(pose.character)[-1][1].stop - len(labels)
-    return np.concatenate([labels, np.zeros(missing, dtype=labels.dtype)])
+def filled(labels: IntArray, character: Character) -> IntArray:
+    """Labels for all polygons of a character: one that is not seen (masked out, say) takes that of the nearest one."""
+    centres = []
+    for obj in character.objects:
+        of_mesh = np.empty(3 * len(obj.data.polygons), dtype=np.float32)
+        obj.data.polygons.foreach_get("center", of_mesh)
+        world = np.array(obj.matrix_world)
+        centres.append(of_mesh.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3])
+    places = np.concatenate(centres)
+    labels = np.concatenate([labels, np.full(len(places) - len(labels), -1)])
+    unseen = labels < 0
+    if unseen.any():
+        labels[unseen] = labels[~unseen][cKDTree(places[~unseen]).query(places[unseen])[1]]
+    return labels
+
+
+def segment_warnings(model: PoseSegmentation, report: Report) -> list[str]:
+    """What the user should know of the segments that were found."""
+    lost = model.n_segments - report.n_segments
+    return [f"{lost} of {model.n_segments} segments are gone: all of their parts were too small"] if lost > 0 else []
 
 
 def pose_warnings(poses: Sequence[Pose], from_frames: bool) -> list[str]:

@@ -1,4 +1,4 @@
-"""The method, without Blender: mesh → surface → laplacian → spectrum → signature → mixture → segmentation → regions."""
+"""The method, without Blender: mesh → surface → laplacian → spectrum → signature → mixture → regions → segmentation."""
 
 from .laplacian import mass_matrix, stiffness_matrix
 from .mesh import TriangleMesh
@@ -7,7 +7,7 @@ from .model_file import ModelFileError
 from .segmentation import PoseSegmentation, PoseSignature
 from .signature import heat_kernel_signature, wave_kernel_signature
 from .spectrum import SpectrumError, eigenpairs
-from .surface import Surface, prepare_surface
+from .surface import Surface, prepare_surface, weld
 
 __all__ = [
     "GaussianMixture",
@@ -24,4 +24,5 @@ __all__ = [
     "prepare_surface",
     "stiffness_matrix",
     "wave_kernel_signature",
+    "weld",
 ]

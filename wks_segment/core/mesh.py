@@ -6,6 +6,8 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -51,7 +53,9 @@ class TriangleMesh:
     def face_areas(self) -> FloatArray:
         """(m,) area of each triangle, in squared units of the vertices."""
         a, b, c = (self.vertices[self.faces[:, i]] for i in range(3))
-        return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
+        areas: FloatArray = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+        areas.setflags(write=False)
+        return areas
 
     @property
     def area(self) -> float:
@@ -63,6 +67,13 @@ class TriangleMesh:
         """(n,) a third of the area of the triangles around each vertex (barycentric lumping)."""
         thirds = np.repeat(self.face_areas / 3, 3)
         return np.bincount(self.faces.ravel(), weights=thirds, minlength=self.n_vertices).astype(np.float64)
+
+    @cached_property
+    def components(self) -> IntArray:
+        """(n,) which loose part each vertex belongs to, numbered 0, 1, …; a vertex without a face is one by itself."""
+        a, b = self.faces[:, [0, 1]].ravel(), self.faces[:, [1, 2]].ravel()
+        graph = coo_matrix((np.ones(len(a), dtype=np.int8), (a, b)), shape=(self.n_vertices,) * 2)
+        return connected_components(graph, directed=False)[1].astype(np.int64)
 
     def __repr__(self) -> str:
         return f"TriangleMesh({self.n_vertices} vertices, {self.n_faces} faces)"

@@ -149,8 +149,7 @@ def _maximise(
     means = masses.T @ samples / weights[:, None]
     covariances: FloatArray
     if covariance_type in ("full", "tied"):
-        centred = [samples - mean for mean in means]
-        scatter = np.stack([(x * mass[:, None]).T @ x for x, mass in zip(centred, masses.T, strict=True)])
+        scatter = np.stack([_scatter(samples - mean, mass) for mean, mass in zip(means, masses.T, strict=True)])
         covariances = scatter.sum(axis=0) if covariance_type == "tied" else scatter / weights[:, None, None]
         covariances = covariances + floor * np.eye(samples.shape[1])
     else:
@@ -162,6 +161,10 @@ def _maximise(
             if covariance_type == "spherical":
                 covariances = covariances.mean(axis=1)
     return GaussianMixture(covariance_type, weights / weights.sum(), means, covariances)
+
+
+def _scatter(centred: FloatArray, mass: FloatArray) -> FloatArray:
+    return (centred * mass[:, None]).T @ centred
 
 
 def _log_gaussians(

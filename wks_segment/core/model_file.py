@@ -18,6 +18,8 @@ VERSION = 1
 PARAMETERS = (
     "n_segments", "covariance_type", "n_eigenpairs", "n_energies", "accuracy", "random_state", "scaling",
 )  # fmt: skip
+LARGEST = {"n_segments": 1000, "n_eigenpairs": 5000, "n_energies": 1000}
+"""A file that asks for more would have a mesh refined until the memory is full."""
 MAX_BYTES = 256 * 2**20
 """A file above this is no model: 64 segments with full covariances of 200 energies take 60 MB."""
 
@@ -54,6 +56,9 @@ def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], Covariance
     if not isinstance(parameters, dict) or set(parameters) != set(PARAMETERS):
         raise ModelFileError(f"the model is damaged: its parameters are not {', '.join(PARAMETERS)}")
     covariance_type: CovarianceType = content.get("mixture_covariance_type")  # type: ignore[assignment]  # checked below
+    for name, most in LARGEST.items():
+        if isinstance(parameters[name], int) and parameters[name] > most:
+            raise ModelFileError(f"the model is damaged: {name} is {parameters[name]}, more than {most}")
     k, d = parameters["n_segments"], parameters["n_energies"]
     shapes = {"shared": (d,), "diag": (k, d), "spherical": (k,), "tied": (d, d), "full": (k, d, d)}
     if covariance_type not in get_args(CovarianceType):
@@ -70,12 +75,16 @@ def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], Covariance
         positive = bool((arrays["covariances"] > 0).all())
     if not (positive and (arrays["spread"] > 0).all() and (arrays["weights"] > 0).all()):
         raise ModelFileError("the model is damaged: a variance or a weight is not positive")
+    if abs(arrays["weights"].sum() - 1) > 1e-6:
+        raise ModelFileError("the model is damaged: the weights do not sum to 1")
     return parameters, arrays, covariance_type
 
 
 def write(path: str | PathLike[str], text: str) -> None:
     """Write text to a file so that a failure half-way leaves an older file as it was."""
-    target = Path(path)
+    target = Path(path).resolve()
+    if target.exists() and not os.access(target, os.W_OK):
+        raise PermissionError(f"{target} may not be written to")
     temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
     try:
         with temporary.open("x", encoding="utf-8") as file:
@@ -90,17 +99,17 @@ def read(path: str | PathLike[str]) -> str:
     """Text of a model file; ModelFileError if it is too large or no text."""
     size = Path(path).stat().st_size
     if size > MAX_BYTES:
-        raise ModelFileError(f"{path}: {size / 2**20:.0f} MB is too large for a model")
+        raise ModelFileError(f"{size / 2**20:.0f} MB is too large for a model")
     try:
         return Path(path).read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
-        raise ModelFileError(f"{path}: this is not a model of WKS Segment, but a binary file") from error
+        raise ModelFileError("this is not a model of WKS Segment, but a binary file") from error
 
 
 def _array(content: dict[str, Any], name: str, shape: tuple[int, ...]) -> FloatArray:
     try:
         array = np.array(content[name], dtype=np.float64)
-    except (KeyError, ValueError, TypeError) as error:
+    except (KeyError, ValueError, TypeError, OverflowError) as error:
         raise ModelFileError(f"the model is damaged: {name} is missing or not numbers") from error
     if array.shape != shape:
         raise ModelFileError(f"the model is damaged: {name} has the shape {array.shape}, not {shape}")

@@ -6,13 +6,13 @@ from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix, csc_matrix, diags
+from scipy.sparse import coo_matrix, csr_matrix, diags
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
+from .cholesky import NestedDissectionCholesky
 from .laplacian import stiffness_matrix, unit_area_masses
-from .mesh import BoolArray, FloatArray, IntArray, TriangleMesh
+from .mesh import FloatArray, IntArray, TriangleMesh
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,9 @@ class FaceAdjacency:
         return cls(np.stack([owner[same], owner[same + 1]], axis=1), lengths)
 
     def between_polygons(self, polygon_of: IntArray) -> FaceAdjacency:
-        """The same borders between polygons, given the polygon of each face; those inside a polygon drop out."""
+        """The same borders between polygons, given the polygon of each face (-1: none); those inside one drop out."""
         pairs = polygon_of[self.pairs]
-        across = pairs[:, 0] != pairs[:, 1]
+        across = (pairs[:, 0] != pairs[:, 1]) & (pairs >= 0).all(axis=1)
         return FaceAdjacency(pairs[across], self.lengths[across])
 
 
@@ -53,9 +53,9 @@ def smooth_posteriors(mesh: TriangleMesh, posteriors: FloatArray, length: float)
     One implicit step of heat flow, (M + t S) p' = M p with t = length²: the same on any meshing.
     """
     masses = unit_area_masses(mesh)
-    system = csc_matrix(diags(masses) + length**2 * stiffness_matrix(mesh))
-    factor = splu(system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    return np.asarray(factor.solve(masses[:, None] * posteriors))
+    system = csr_matrix(diags(masses) + length**2 * stiffness_matrix(mesh))
+    factor = NestedDissectionCholesky(system, mesh.vertices, np.float64)
+    return factor.solve(masses[:, None] * posteriors)
 
 
 def connected_regions(labels: IntArray, adjacency: FaceAdjacency) -> IntArray:
@@ -74,16 +74,17 @@ def connected_regions(labels: IntArray, adjacency: FaceAdjacency) -> IntArray:
 
 def merge_crumbs(
     labels: IntArray, areas: FloatArray, centres: FloatArray, adjacency: FaceAdjacency, min_share: float
-) -> IntArray:
+) -> tuple[IntArray, FaceAdjacency]:
     """Give every connected region under a share of the area the label of a neighbour.
 
     The smallest goes first, to the neighbour with which it shares most border. A loose piece that is too small as a
     whole takes the label of the face nearest to it that belongs to a large enough region, as an eye does that of its
-    head.
+    head, and counts as adjacent to it from then on.
 
     Parameters
     ----------
     labels : (m,) int array
+        -1: a face that takes no part.
     areas : (m,) array
     centres : (m, 3) array
     adjacency : FaceAdjacency
@@ -92,7 +93,7 @@ def merge_crumbs(
 
     Returns
     -------
-    (m,) int array of labels.
+    (m,) int array of labels, and the adjacency with the loose pieces tied to what adopted them.
     """
     region = connected_regions(labels, adjacency)
     count = region.max() + 1
@@ -128,7 +129,17 @@ def merge_crumbs(
             borders[target][neighbour] = borders[target].get(neighbour, 0.0) + length
     owner = np.array([root(i) for i in range(count)])
     merged = label_of[owner][region]
-    return _adopt_loose_pieces(merged, size[owner][region] < least, centres)
+    loose = (size[owner][region] < least) & (merged >= 0)
+    large = ~loose & (merged >= 0)
+    if not (loose.any() and large.any()):
+        return merged, adjacency
+    loose, large = np.flatnonzero(loose), np.flatnonzero(large)
+    adopting = large[cKDTree(centres[large]).query(centres[loose])[1]]
+    merged[loose] = merged[adopting]
+    ties = np.stack([loose, adopting], axis=1)
+    return merged, FaceAdjacency(
+        np.concatenate([adjacency.pairs, ties]), np.concatenate([adjacency.lengths, np.zeros(len(ties))])
+    )
 
 
 def _border_lengths(region: IntArray, adjacency: FaceAdjacency) -> dict[int, dict[int, float]]:
@@ -142,13 +153,3 @@ def _border_lengths(region: IntArray, adjacency: FaceAdjacency) -> dict[int, dic
     for i, j, length in zip(full.row.tolist(), full.col.tolist(), full.data.tolist(), strict=True):
         borders[i][j] = length
     return borders
-
-
-def _adopt_loose_pieces(labels: IntArray, loose: BoolArray, centres: FloatArray) -> IntArray:
-    """Give faces of loose, small pieces the label of the nearest face of a region that is large enough."""
-    if not loose.any() or loose.all():
-        return labels
-    labels = labels.copy()
-    nearest = cKDTree(centres[~loose]).query(centres[loose])[1]
-    labels[loose] = labels[~loose][nearest]
-    return labels

@@ -12,6 +12,7 @@ from os import PathLike
 from typing import Literal, get_args
 
 import numpy as np
+from scipy.sparse import diags
 
 from . import model_file
 from .laplacian import unit_area_masses
@@ -47,10 +48,13 @@ class PoseSignature:
     surface : Surface
         The welded and refined surface, with n' vertices.
     signature : (n', n_energies) array of float
+    n_eigenpairs : int
+        What it was computed from.
     """
 
     surface: Surface
     signature: FloatArray
+    n_eigenpairs: int
 
 
 class PoseSegmentation:
@@ -101,8 +105,15 @@ class PoseSegmentation:
         self.random_state = random_state
         self.scaling = scaling
 
-    def describe(self, mesh: TriangleMesh) -> PoseSignature:
+    def describe(self, mesh: TriangleMesh, welded: IntArray | None = None) -> PoseSignature:
         """Compute the signature of one pose, to pass it to the other methods in the place of the mesh.
+
+        Parameters
+        ----------
+        mesh : TriangleMesh
+            The pose.
+        welded : (n,) int array, optional
+            `weld(*poses)` of all poses of the same mesh: pieces that meet in some poses only stay apart in all.
 
         Raises
         ------
@@ -112,10 +123,11 @@ class PoseSegmentation:
             If the eigenpairs could not be computed.
         """
         self._check_parameters()
-        surface = prepare_surface(mesh, VERTICES_PER_PAIR * self.n_eigenpairs)
+        surface = prepare_surface(mesh, VERTICES_PER_PAIR * self.n_eigenpairs, welded)
         n_pairs = self.n_eigenpairs + surface.n_components - 1
         values, functions = eigenpairs(surface.mesh, n_pairs, self.accuracy)
-        return PoseSignature(surface, wave_kernel_signature(values, functions, self.n_energies))
+        signature = wave_kernel_signature(values, functions, self.n_energies)
+        return PoseSignature(surface, signature, self.n_eigenpairs)
 
     def fit(self, meshes: Sequence[TriangleMesh | PoseSignature], progress: Progress | None = None) -> PoseSegmentation:
         """Learn the parts from one or more poses together.
@@ -172,6 +184,7 @@ class PoseSegmentation:
 
     def predict_proba(self, mesh: TriangleMesh | PoseSignature) -> FloatArray:
         """(n, n_segments) posterior of each component at each vertex; rows sum to 1."""
+        self._fitted()
         pose = self._described(mesh)
         return pose.surface.to_vertices(self._posteriors(pose))
 
@@ -180,18 +193,27 @@ class PoseSegmentation:
 
         Comparable between models with the same number of energies and the same scaling.
         """
+        mixture = self._fitted()
         pose = self._described(mesh)
-        likelihoods = self._fitted().log_likelihoods(self._standardised(pose.signature))
+        likelihoods = mixture.log_likelihoods(self._standardised(pose.signature))
         masses = unit_area_masses(pose.surface.mesh)
         # A density in standardised units, brought back to those of the signature that models share.
         return float(masses @ likelihoods / masses.sum() - np.log(self.spread_).sum())
 
     def segment_faces(self, mesh: TriangleMesh | PoseSignature, min_share: float = MIN_SHARE) -> IntArray:
-        """(m,) component of each face, cleaned: smooth borders, no connected part under `min_share` of the area."""
+        """(m,) component of each face, cleaned: smooth borders, no connected part under `min_share` of the area.
+
+        A loose piece that is smaller as a whole takes the label of what is next to it.
+        """
+        self._fitted()
         return self._clean([self._described(mesh)], None, min_share)[0]
 
     def segment_regions(self, mesh: TriangleMesh | PoseSignature, min_share: float = MIN_SHARE) -> IntArray:
-        """(m,) connected part of each face, numbered 0, 1, …: left and right hand are two."""
+        """(m,) connected part of each face, numbered 0, 1, …: left and right hand are two.
+
+        A loose piece under `min_share` of the area belongs to the part next to it.
+        """
+        self._fitted()
         return connected_regions(*self._clean([self._described(mesh)], None, min_share))
 
     def segment_polygons(
@@ -208,17 +230,19 @@ class PoseSegmentation:
             The same mesh in each pose, as triangles. The posteriors of all poses are averaged.
         polygons
             For each pose, the polygon that each triangle is a piece of; several triangles can be of one polygon, and
-            a polygon without a triangle takes no part (its label is 0).
+            -1 stands for a triangle of none, which shapes the surface but has no say.
 
         Returns
         -------
-        (p,) component of each polygon, 0 to the largest number in `polygons`.
+        (p,) component of each polygon, 0 to the largest number in `polygons`; -1 for one without a triangle in any
+        pose.
 
         Raises
         ------
         ValueError
             If there is no pose, or the lengths do not fit.
         """
+        self._fitted()
         described = [self._described(pose) for pose in poses]
         if not described or len(described) != len(polygons):
             raise ValueError(f"there are {len(described)} poses, but polygons for {len(polygons)}")
@@ -298,8 +322,12 @@ class PoseSegmentation:
 
     def _described(self, mesh: TriangleMesh | PoseSignature) -> PoseSignature:
         if isinstance(mesh, PoseSignature):
-            if mesh.signature.shape[1] != self.n_energies:
-                raise ValueError(f"the signature has {mesh.signature.shape[1]} energies, not {self.n_energies}")
+            got = (mesh.n_eigenpairs, mesh.signature.shape[1])
+            if got != (self.n_eigenpairs, self.n_energies):
+                raise ValueError(
+                    f"the signature is of {got[0]} eigenpairs and {got[1]} energies, "
+                    f"the model of {self.n_eigenpairs} and {self.n_energies}"
+                )
             return mesh
         if not isinstance(mesh, TriangleMesh):
             raise TypeError(f"a pose must be a TriangleMesh or a PoseSignature, not {type(mesh).__name__}")
@@ -318,26 +346,32 @@ class PoseSegmentation:
     def _clean(
         self, poses: Sequence[PoseSignature], polygons: Sequence[IntArray] | None, min_share: float
     ) -> tuple[IntArray, FaceAdjacency]:
-        """Labels of polygons (None: each triangle is one), from the mean posterior of all poses, and neighbours."""
+        """Labels of polygons (None: each triangle is one) from the mean posterior of all poses, and neighbours."""
         if not 0 <= min_share < 1:
             raise ValueError(f"min_share must be from 0 to below 1, not {min_share!r}")
         if polygons is None:
             polygons = [np.arange(pose.surface.original.n_faces) for pose in poses]
         n_polygons = 1 + max(int(polygon_of.max()) for polygon_of in polygons)
         posteriors = np.zeros((n_polygons, self.n_segments))
+        areas, centres, poses_seen = np.zeros(n_polygons), np.zeros((n_polygons, 3)), np.zeros(n_polygons)
+        borders = []
         for pose, polygon_of in zip(poses, polygons, strict=True):
-            smooth = smooth_posteriors(pose.surface.mesh, self._posteriors(pose), SMOOTHING_LENGTH)
+            surface, original = pose.surface, pose.surface.original
+            sum_over = indicator(np.where(polygon_of < 0, n_polygons, polygon_of), n_polygons + 1)[:n_polygons]
             # A triangle without area still speaks, if very softly, or its polygon would have no label.
-            areas = pose.surface.original.face_areas / pose.surface.original.area + np.finfo(float).eps
-            sum_over = indicator(polygon_of, n_polygons)
-            total = np.maximum(sum_over @ areas, np.finfo(float).tiny)
-            posteriors += sum_over @ (pose.surface.to_faces(smooth) * areas[:, None]) / total[:, None]
-        # Sizes, places and borders are those of the first pose.
-        original, polygon_of = poses[0].surface.original, polygons[0]
-        sum_over = indicator(polygon_of, n_polygons)
-        areas = sum_over @ original.face_areas
-        count = np.maximum(sum_over @ np.ones(original.n_faces), 1)
-        centres = sum_over @ original.vertices[original.faces].mean(axis=1) / count[:, None]
-        adjacency = FaceAdjacency.of(poses[0].surface.welded_faces, poses[0].surface.mesh.vertices)
-        adjacency = adjacency.between_polygons(polygon_of)
-        return merge_crumbs(posteriors.argmax(axis=1), areas, centres, adjacency, min_share), adjacency
+            weight = original.face_areas / original.area + np.finfo(float).eps
+            total = sum_over @ weight
+            seen = total > 0
+            mean = diags(1 / np.where(seen, total, 1)) @ sum_over @ diags(weight)
+            smooth = smooth_posteriors(surface.mesh, self._posteriors(pose), SMOOTHING_LENGTH)
+            posteriors += mean @ surface.to_faces(smooth)
+            centres += mean @ original.vertices[original.faces].mean(axis=1)
+            areas += total * seen
+            poses_seen += seen
+            borders.append(FaceAdjacency.of(surface.welded_faces, original.vertices).between_polygons(polygon_of))
+        seen = poses_seen > 0
+        # Of one mesh the borders are the same in every pose; modifiers may hide some of them in one.
+        adjacency = max(borders, key=lambda border: len(border.pairs))
+        centres /= np.maximum(poses_seen, 1)[:, None]
+        labels = np.where(seen, posteriors.argmax(axis=1), -1)
+        return merge_crumbs(labels, areas, centres, adjacency, min_share)

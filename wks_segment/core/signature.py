@@ -25,7 +25,7 @@ def wave_kernel_signature(values: ArrayLike, functions: ArrayLike, n_energies: i
     """Wave Kernel Signature of every vertex.
 
     WKS(x, e) = (1 / C_e) Σ_k exp(−(e − log E_k)² / 2σ²) φ_k(x)², with C_e = Σ_k exp(−(e − log E_k)² / 2σ²), at M
-    energies e in equal steps from log E_1 to log(E_N) / 1.02, σ = 7 (e_max − e_min) / M (section 3 of the paper).
+    equally spaced energies e from log E_1 to log(E_N) / 1.02, both among them, σ = 7 (e_max − e_min) / M.
     The mean over the surface is 1 at every energy, if its area is 1.
 
     Parameters
@@ -39,7 +39,7 @@ def wave_kernel_signature(values: ArrayLike, functions: ArrayLike, n_energies: i
 
     Returns
     -------
-    (n, M) array of float.
+    (n, M) array of float, in the precision of the functions.
 
     Raises
     ------
@@ -111,7 +111,8 @@ def _checked_pairs(values: ArrayLike, functions: ArrayLike) -> tuple[FloatArray,
 
 def _squares_times(functions: FloatArray, columns: IntArray, weights: FloatArray) -> FloatArray:
     """functions[:, columns]² @ weights, a block of rows at a time."""
-    result = np.empty((len(functions), weights.shape[1]))
+    weights = weights.astype(functions.dtype)  # single precision stays single
+    result = np.empty((len(functions), weights.shape[1]), dtype=functions.dtype)
     for start in range(0, len(functions), ROWS):
         block = functions[start : start + ROWS, columns]
         result[start : start + ROWS] = block**2 @ weights

@@ -8,17 +8,20 @@ vertices and faces.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from .mesh import FloatArray, IntArray, TriangleMesh, repeats_a_vertex
+from .mesh import BoolArray, FloatArray, IntArray, TriangleMesh, repeats_a_vertex
 
 WELD_TOLERANCE = 1e-6
 """Distance under which two border vertices are one, as a fraction of the bounding box's diagonal."""
+LEAST_PIECE = 1e-3
+"""A loose part below this share of the area stays out of the operator: it would cost a zero mode and say nothing."""
+MOST_PIECES = 100
+"""Loose parts that the operator sees at most, the largest ones."""
 
 
 @dataclass(frozen=True)
@@ -32,11 +35,12 @@ class Surface:
     mesh : TriangleMesh
         The surface: no two vertices at one place along seams, every vertex in a face, fine enough.
     vertex_of : (n,) int array
-        The vertex of `mesh` that stands for each vertex of `original`.
+        The vertex of `mesh` that stands for each vertex of `original`; the nearest one, for vertices without a face
+        and those of loose parts that are left out.
     face_of : (m',) int array
         The face of `original` that each face of `mesh` is a piece of.
     welded_faces : (m, 3) int array
-        The faces of `original`, with the vertices of `mesh` as corners: what is adjacent on the surface.
+        The faces of `original`, with one number for all vertices at one place: what is adjacent on the surface.
     """
 
     original: TriangleMesh
@@ -45,12 +49,10 @@ class Surface:
     face_of: IntArray
     welded_faces: IntArray
 
-    @cached_property
+    @property
     def n_components(self) -> int:
-        """Number of loose parts, each with a zero mode of its own."""
-        first, second = self.mesh.faces[:, [0, 1]].ravel(), self.mesh.faces[:, [1, 2]].ravel()
-        graph = coo_matrix((np.ones(len(first)), (first, second)), shape=(self.mesh.n_vertices,) * 2)
-        return int(connected_components(graph, directed=False)[0])
+        """Number of loose parts of `mesh`, each with a zero mode of its own."""
+        return int(self.mesh.components.max()) + 1
 
     def to_vertices(self, values: FloatArray) -> FloatArray:
         """Carry (n', …) values at vertices of the surface back to the (n, …) original vertices."""
@@ -63,13 +65,13 @@ class Surface:
         total = sum_over @ areas
         at_pieces = values[self.mesh.faces].mean(axis=1)
         at_faces = sum_over @ (at_pieces * areas[:, None]) / np.where(total > 0, total, 1)[:, None]
-        # A face without area has no piece to average over: its corners speak for it.
-        flat = total <= 0
-        at_faces[flat] = values[self.welded_faces[flat]].mean(axis=1)
+        # A face that is not on the surface, or has no area, has no piece to average over: its corners speak for it.
+        without = total <= 0
+        at_faces[without] = values[self.vertex_of[self.original.faces[without]]].mean(axis=1)
         return at_faces
 
 
-def prepare_surface(mesh: TriangleMesh, min_vertices: int = 0) -> Surface:
+def prepare_surface(mesh: TriangleMesh, min_vertices: int = 0, welded: IntArray | None = None) -> Surface:
     """Weld a mesh along its seams and refine it, flat, until it has at least `min_vertices` vertices.
 
     Parameters
@@ -78,29 +80,30 @@ def prepare_surface(mesh: TriangleMesh, min_vertices: int = 0) -> Surface:
         The mesh as it came.
     min_vertices : int
         Each triangle is split into four as often as it takes; 0 leaves the mesh as it is.
+    welded : (n,) int array, optional
+        What `weld` gave for all poses of the mesh together, so that it is one surface in all of them.
 
     Raises
     ------
     ValueError
         If no face is left after welding.
     """
-    vertex_of = weld(mesh)
-    welded_faces = vertex_of[mesh.faces]
+    welded_faces = (weld(mesh) if welded is None else welded)[mesh.faces]
     face_of = np.flatnonzero(~repeats_a_vertex(welded_faces))
-    faces = welded_faces[face_of]
-    if not len(faces):
+    if not len(face_of):
         raise ValueError("every face of the mesh collapses when vertices at the same position are joined")
+    face_of = face_of[_in_large_pieces(mesh, welded_faces[face_of])]
+    faces = welded_faces[face_of]
 
     used = np.unique(faces)
     compact = np.full(mesh.n_vertices, -1)
     compact[used] = np.arange(len(used))
     vertices, faces = mesh.vertices[used], compact[faces]
-    vertex_of = compact[vertex_of]
-    stray = np.flatnonzero(vertex_of < 0)
-    if stray.size:
-        # A vertex without a face still gets a label: that of the surface next to it.
-        vertex_of[stray] = cKDTree(vertices).query(mesh.vertices[stray])[1]
-    welded_faces = vertex_of[mesh.faces]
+    vertex_of = np.full(mesh.n_vertices, -1)
+    vertex_of[mesh.faces] = compact[welded_faces]
+    outside = np.flatnonzero(vertex_of < 0)
+    if outside.size:
+        vertex_of[outside] = cKDTree(vertices).query(mesh.vertices[outside])[1]
 
     while len(vertices) < min_vertices:
         vertices, faces = _split_in_four(vertices, faces)
@@ -108,32 +111,54 @@ def prepare_surface(mesh: TriangleMesh, min_vertices: int = 0) -> Surface:
     return Surface(mesh, TriangleMesh(vertices, faces), vertex_of, face_of, welded_faces)
 
 
+def _in_large_pieces(mesh: TriangleMesh, faces: IntArray) -> BoolArray:
+    """(m',) whether each face belongs to a loose part that is large enough for the operator."""
+    piece = TriangleMesh(mesh.vertices, faces).components[faces[:, 0]]
+    corners = mesh.vertices[faces]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    size = np.bincount(piece, weights=areas)
+    largest_first = np.argsort(-size, kind="stable")
+    large = np.zeros(len(size), dtype=bool)
+    large[largest_first[:MOST_PIECES]] = True
+    worth_it = size >= LEAST_PIECE * size.sum()
+    return (large & worth_it if worth_it.any() else large)[piece]
+
+
 def indicator(owner: IntArray, n_owners: int) -> csr_matrix:
     """(n_owners, len(owner)) sparse matrix that sums what belongs to each owner."""
     return csr_matrix((np.ones(len(owner)), (owner, np.arange(len(owner)))), shape=(n_owners, len(owner)))
 
 
-def weld(mesh: TriangleMesh) -> IntArray:
-    """(n,) for each vertex, the lowest-numbered vertex at the same position that it is joined with.
+def weld(*poses: TriangleMesh) -> IntArray:
+    """(n,) for each vertex, the lowest-numbered vertex that it is joined with: at the same position in all poses.
 
-    Only vertices on open borders are joined: a seam always opens one, while closed lips or a hand that rests on the
-    hip touch without being one surface, and do so in some poses only.
+    Joined are vertices on open borders and the ends of edges without length. Not others: a seam always opens a border,
+    while closed lips or a hand that rests on the hip touch without being one surface, and do so in some poses only.
     """
+    groups = np.stack([_same_position(mesh) for mesh in poses])
+    group = np.unique(groups, axis=1, return_inverse=True)[1].ravel() if len(poses) > 1 else groups[0]
+    lowest = np.full(group.max() + 1, len(group))
+    np.minimum.at(lowest, group, np.arange(len(group)))
+    return lowest[group]
+
+
+def _same_position(mesh: TriangleMesh) -> IntArray:
+    """(n,) number of the group of joined vertices that each vertex is in."""
     edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    unique, count = np.unique(edges, axis=0, return_counts=True)
-    border = np.unique(unique[count == 1])
-    result = np.arange(mesh.n_vertices)
-    if not border.size:
-        return result
-    positions, group = np.unique(mesh.vertices[border], axis=0, return_inverse=True)
-    diagonal = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
-    pairs = cKDTree(positions).query_pairs(WELD_TOLERANCE * diagonal, output_type="ndarray")
-    near = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(positions),) * 2)
-    group = connected_components(near, directed=False)[1][group.ravel()]
-    lowest = np.full(group.max() + 1, mesh.n_vertices)
-    np.minimum.at(lowest, group, border)
-    result[border] = lowest[group]
-    return result
+    edges, count = np.unique(edges, axis=0, return_counts=True)
+    tolerance = WELD_TOLERANCE * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
+    length = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
+    joined = [edges[length <= tolerance]]
+    border = np.unique(edges[count == 1])
+    if border.size:
+        # Exactly equal ones first: a soup of triangles has many, and the search for near ones would list every pair.
+        positions, first, same = np.unique(mesh.vertices[border], axis=0, return_index=True, return_inverse=True)
+        joined.append(np.stack([border, border[first[same.ravel()]]], axis=1))
+        near = cKDTree(positions).query_pairs(tolerance, output_type="ndarray")
+        joined.append(border[first[near]])
+    a, b = np.concatenate(joined).T
+    graph = coo_matrix((np.ones(len(a), dtype=np.int8), (a, b)), shape=(mesh.n_vertices,) * 2)
+    return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def _split_in_four(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..characters import mesh_objects
-from ..labels import NOTE, clear_labels
+from ..labels import clear_labels, has_labels
 from . import feedback
 
 
@@ -20,7 +20,7 @@ class WKS_SEGMENT_OT_clear(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not feedback.in_object_mode(cls, context):
             return False
-        if not any(NOTE in obj.data for obj in mesh_objects(context.selected_objects)):
+        if not any(has_labels(obj.data) for obj in mesh_objects(context.selected_objects)):
             cls.poll_message_set("Select an object that has segments")
             return False
         return True
@@ -28,5 +28,7 @@ class WKS_SEGMENT_OT_clear(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         meshes = {obj.data for obj in mesh_objects(context.selected_objects) if obj.data.library is None}
         cleared = sum(clear_labels(mesh) for mesh in meshes)
+        if not any(has_labels(mesh) for mesh in bpy.data.meshes):
+            feedback.hide_colors(context)
         self.report({"INFO"}, f"Cleared the segments of {cleared} mesh{'es' * (cleared != 1)}")
         return {"FINISHED"}

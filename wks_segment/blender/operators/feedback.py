@@ -48,6 +48,13 @@ def show_colors(context: bpy.types.Context) -> None:
         space.shading.color_type = LOOK
 
 
+def hide_colors(context: bpy.types.Context) -> None:
+    """Let that viewport show materials again."""
+    space = context.space_data
+    if space is not None and space.type == "VIEW_3D" and space.shading.color_type == LOOK:
+        space.shading.color_type = "MATERIAL"
+
+
 def in_object_mode(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """For `poll`: whether the mode is right; sets the message if not."""
     if context.mode != "OBJECT":

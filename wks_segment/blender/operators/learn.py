@@ -29,6 +29,7 @@ class WKS_SEGMENT_OT_learn(bpy.types.Operator):
                 model, described = tasks.learn(poses, settings, report, progress)
                 labels = tasks.label(model, poses, described, settings, report)
                 tasks.write(labels, settings, report)
+                report.warnings += tasks.segment_warnings(model, report)
         except UserError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -31,6 +31,7 @@ class WKS_SEGMENT_OT_save_model(bpy.types.Operator, ExportHelper):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         path = Path(bpy.path.abspath(self.filepath))
+        path = path if path.suffix else path.with_suffix(self.filename_ext)
         try:
             tasks.stored_model(context.scene.wks_segment)
             model_file.write(path, context.scene.wks_segment.model)
