@@ -40,8 +40,7 @@ def test_it_walks(scene, creature):
 def test_its_walk_is_a_cycle(scene, creature):
     first, last = reader.read_frames(bpy.context, Character((creature,)), [FIRST_FRAME, LAST_FRAME + 1])
     assert first.is_like(last)
-    (action,) = Character((creature,)).actions
-    assert tuple(action.frame_range) == (FIRST_FRAME, LAST_FRAME + 1)
+    assert Character((creature,)).frame_ranges() == [(FIRST_FRAME, LAST_FRAME + 1)]
 
 
 def test_its_right_half_mirrors_the_left(creature):

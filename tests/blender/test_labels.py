@@ -84,10 +84,11 @@ def test_each_face_has_one_flat_colour_of_the_palette(mesh):
     np.testing.assert_array_equal(corners[:, 3], 1)
 
 
-def test_colours_are_shown(painted):
+def test_colours_are_shown_and_what_is_rendered_stays(painted):
+    rendered = painted.color_attributes[painted.color_attributes.render_color_index].name
     write_labels(painted, stripes(painted))
     assert painted.color_attributes.active_color.name == "wks_segment_color"
-    assert painted.color_attributes[painted.color_attributes.render_color_index].name == "wks_segment_color"
+    assert painted.color_attributes[painted.color_attributes.render_color_index].name == rendered
 
 
 def test_without_colours_the_active_colour_stays(painted):

@@ -9,7 +9,19 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parents[2] / "wks_segment"
 BLENDERS_OWN = {"bpy", "bmesh", "mathutils", "bpy_extras", "gpu", "blf", "aud"}
-CHAIN = ["mesh", "surface", "laplacian", "cholesky", "coarse", "spectrum", "signature", "mixture", "regions", "model_file", "segmentation"]
+CHAIN = [
+    "mesh",
+    "surface",
+    "laplacian",
+    "cholesky",
+    "coarse",
+    "spectrum",
+    "signature",
+    "mixture",
+    "regions",
+    "model_file",
+    "segmentation",
+]
 
 
 def imports(path):

@@ -37,7 +37,10 @@ def changed(text, change):
         (lambda c: c.update(mixture_covariance_type="round"), "unknown covariance type"),
         (lambda c: c["parameters"].pop("n_energies"), "its parameters are not"),
         (lambda c: c["parameters"].update(accuracy="best"), "bad parameter: accuracy must be one of"),
-        (lambda c: c["parameters"].update(n_segments=10**9), "shape"),
+        (lambda c: c["parameters"].update(n_segments=10**9), "n_segments is 1000000000, more than"),
+        (lambda c: c["parameters"].update(n_eigenpairs=10**9), "n_eigenpairs is 1000000000, more than"),
+        (lambda c: c["means"][0].__setitem__(0, 10**400), "means is missing or not numbers"),
+        (lambda c: c.update(weights=[1.0, 1.0, 1.0]), "weights do not sum to 1"),
         (lambda c: c["parameters"].update(n_segments=[3]), "shape"),
     ],
 )

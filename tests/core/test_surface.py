@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from shapes import grid, icosphere, split_at_every_corner, together
 
-from wks_segment.core import TriangleMesh, prepare_surface
+from wks_segment.core import TriangleMesh, prepare_surface, weld
 
 
 def test_a_soup_of_triangles_is_welded_to_the_surface_it_was():
@@ -64,3 +64,36 @@ def test_nothing_left_is_an_error():
     vertices = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1e9, 0, 0)]
     with pytest.raises(ValueError, match="collapses"):
         prepare_surface(TriangleMesh(vertices, [(0, 1, 2)]))
+
+
+def test_a_part_shrunk_to_a_point_is_one_vertex():
+    # A bone scaled to zero hides a part: no vertex of it may become a component of its own.
+    sphere = icosphere(3)
+    vertices = sphere.vertices.copy()
+    hidden = vertices[:, 2] > 0.7
+    vertices[hidden] = (0, 0, 0.7)
+    surface = prepare_surface(TriangleMesh(vertices, sphere.faces), 3000)
+    assert surface.n_components == 1
+    assert np.unique(surface.vertex_of[hidden]).size == 1
+
+
+def test_pieces_that_meet_in_some_poses_stay_apart_in_all():
+    upper, lower = grid(8, 8), grid(8, 8)
+    touching = together(upper, TriangleMesh(lower.vertices + (1, 0, 0), lower.faces))
+    apart = together(upper, TriangleMesh(lower.vertices + (1.5, 0, 0), lower.faces))
+    assert prepare_surface(touching).n_components == 1
+    assert prepare_surface(touching, welded=weld(touching, apart)).n_components == 2
+
+
+def test_tiny_loose_parts_stay_out_and_take_the_value_next_to_them():
+    speck = TriangleMesh(0.005 * icosphere(0).vertices + (1.01, 0, 0), icosphere(0).faces)
+    surface = prepare_surface(together(icosphere(3), *[speck] * 30))
+    assert surface.n_components == 1
+    values = surface.to_vertices(surface.mesh.vertices)
+    assert np.abs(values[-12:] - (1, 0, 0)).max() < 0.1
+    assert surface.to_faces(surface.mesh.vertices).shape == (icosphere(3).n_faces + 600, 3)
+
+
+def test_nothing_but_many_small_parts_is_still_a_surface():
+    cards = [TriangleMesh(grid(1, 1).vertices + (2 * i, 0, 0), grid(1, 1).faces) for i in range(1500)]
+    assert prepare_surface(together(*cards)).n_components == 100

@@ -49,6 +49,11 @@ def run(
     """
     if n_learned < 1 or n_unseen < 1:
         raise UserError("The demo needs a pose to learn from and one to check on")
+    report = Report([])
+    frames = reader.own_frames(context.scene, character, n_learned + n_unseen)
+    if len(frames) < n_learned + n_unseen:
+        raise UserError(f"{n_learned + n_unseen} poses are asked for, but the animation has only {len(frames)} frames")
+    learned = split(len(frames), n_learned)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -56,11 +61,6 @@ def run(
     paths = {kind: path.with_name(path.name + suffix) for kind, suffix in SUFFIXES.items()}
     for written in paths.values():
         files.check_folder(written)
-    report = Report([])
-    frames = reader.own_frames(context.scene, character, n_learned + n_unseen)
-    if len(frames) < n_learned + n_unseen:
-        raise UserError(f"{n_learned + n_unseen} poses are asked for, but the animation has only {len(frames)} frames")
-    learned = split(len(frames), n_learned)
     with report.stage("read"):
         poses = reader.read_frames(context, character, frames)
     report.poses = poses

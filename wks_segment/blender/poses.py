@@ -153,6 +153,10 @@ def read_pose(context: bpy.types.Context, character: Character, name: str) -> Po
         depsgraph = context.evaluated_depsgraph_get()
         for obj, polygons in polygon_ranges(character):
             points, faces, polygon_of = _read_object(obj, depsgraph, origins.get(obj.data))
+            bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+            if bad.size:
+                place = f'vertex {bad[0]} of "{obj.name}"'
+                raise UserError(f'"{name}": {place} has a coordinate that is not finite ({bad.size} such vertices)')
             vertices.append(points)
             triangles.append(faces + n_vertices)
             owners.append(np.where(polygon_of < 0, -1, polygon_of + polygons.start))
@@ -190,9 +194,6 @@ def _read_object(
         world = np.array(evaluated.matrix_world, dtype=np.float64)
     finally:
         evaluated.to_mesh_clear()
-    bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
-    if bad.size:
-        raise UserError(f'"{obj.name}": vertex {bad[0]} has a coordinate that is not finite ({bad.size} such vertices)')
     return vertices @ world[:3, :3].T + world[:3, 3], triangles.astype(np.int64), polygon_of.astype(np.int64)
 
 

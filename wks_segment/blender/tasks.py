@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from ..core import PoseSegmentation, PoseSignature, SpectrumError, weld
 from ..core.mesh import IntArray
 from . import poses as reader
-from .characters import Character, group, mesh_objects
+from .characters import Character, armature_of, group, mesh_objects
 from .errors import UserError
 from .labels import write_labels
 from .poses import Pose
@@ -82,8 +82,10 @@ def active_character(context: bpy.types.Context, characters: Sequence[Character]
     UserError
         If there are several and the active object is of none.
     """
+    active = context.active_object
     for character in characters:
-        if context.active_object in character.objects or len(characters) == 1:
+        members = (*character.objects, armature_of(character.objects[0]))
+        if len(characters) == 1 or (active is not None and active in members):
             return character
     names = ", ".join(character.name for character in characters[:5])
     raise UserError(f"{len(characters)} characters are selected ({names}): click the one whose poses are meant")

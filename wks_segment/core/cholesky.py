@@ -95,11 +95,9 @@ def eigenvalues_below_zero(matrix: csr_matrix, positions: FloatArray) -> int:
     for front in fronts:
         block = _assemble(lower, front, updates, place, np.float64)
         size = front.last - front.first
-        own, across = block[:size, :size], block[size:, :size]
-        own = np.tril(own) + np.tril(own, -1).T
-        pivots, vectors = np.linalg.eigh(own)
+        pivots, vectors = np.linalg.eigh(block[:size, :size], UPLO="L")
         count += int(np.count_nonzero(pivots < 0))
-        projected = across @ vectors
+        projected = block[size:, :size] @ vectors
         updates[id(front)] = block[size:, size:] - (projected / pivots) @ projected.T
     return count
 
