@@ -6,6 +6,7 @@ which is the paper's remedy against over-fitting; hence our own. Its k-means sta
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -13,6 +14,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 from sklearn.cluster import KMeans
+from sklearn.exceptions import ConvergenceWarning
 from threadpoolctl import threadpool_limits
 
 from .mesh import FloatArray
@@ -111,7 +113,10 @@ def fit_mixture(
     floor = VARIANCE_FLOOR * float(shares @ ((samples - mean) ** 2).mean(axis=1))
     candidates = []
     for seed in generator.integers(2**31, size=STARTS):
-        start = KMeans(n_components, n_init=1, random_state=int(seed)).fit_predict(sketch, sample_weight=sketch_shares)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ConvergenceWarning)  # too few different samples: an error below
+            kmeans = KMeans(n_components, n_init=1, random_state=int(seed))
+            start = kmeans.fit_predict(sketch, sample_weight=sketch_shares)
         if len(np.unique(start)) < n_components:
             raise ValueError(
                 f"{n_components} components are too many: the samples have only {len(np.unique(start))} distinct values"
