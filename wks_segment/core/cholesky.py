@@ -64,7 +64,7 @@ class NestedDissectionCholesky:
 
     def solve(self, right: FloatArray) -> FloatArray:
         """(n, k) solution of A X = right for (n, k) right-hand sides."""
-        x: FloatArray = right[self._order].astype(self.dtype)
+        x: FloatArray = right[self._order].astype(self.dtype, copy=False)
         for front, inverse, coupling in self._factors:
             own = slice(front.first, front.last)
             x[own] = inverse @ x[own]
