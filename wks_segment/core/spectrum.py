@@ -90,7 +90,7 @@ def eigenpairs(mesh: TriangleMesh, n_pairs: int = 300, accuracy: Accuracy = "fas
     values : (k,) array of float, rising
         Eigenvalues, without unit since the area is 1. Zero modes are exactly 0.
     functions : (n, k) array of float (float32 from "fast")
-        Eigenfunctions, orthonormal under M: φ_iᵀ M φ_j = δ_ij ("fast": to about 1e-2).
+        Eigenfunctions, orthonormal under M: φ_iᵀ M φ_j = δ_ij ("fast": to about 1e-3).
 
     Raises
     ------
