@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import sys
 from collections.abc import Iterator, Sequence
@@ -51,6 +52,8 @@ def only_result_on_stdout() -> Iterator[TextIO]:
             yield result
     finally:
         sys.stdout.flush()
+        # What Blender printed may still wait in the C library, and would come out after the result.
+        ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None).fflush(None)
         os.dup2(real, 1)
         os.close(real)
 

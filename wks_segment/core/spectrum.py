@@ -203,20 +203,23 @@ def _block_lanczos(factor: NestedDissectionCholesky, known: FloatArray, count: i
     largest = n - known.shape[1]
     width = min(BLOCK, largest)
     next_look = FIRST_LOOK * count
-    basis = np.empty((n, 0))
+    space = np.empty((n, min(int(next_look) + 2 * width, largest)), order="F")
     projected = np.zeros((0, 0))
     block = factor.solve(np.random.default_rng(0).standard_normal((n, width)))
     block = _orthonormal_to(known, block)
     while True:
-        basis = np.hstack([basis, block])
+        old, size = len(projected), len(projected) + width
+        if size > space.shape[1]:
+            space = np.concatenate([space, np.empty((n, space.shape[1] // 4 + width), order="F")], axis=1)
+        space[:, old:size] = block
+        basis = space[:, :size]
         image = factor.solve(block)
         column = basis.T @ image
-        old = len(projected)
         projected = np.pad(projected, (0, width))
         projected[:, old:], projected[old:, :] = column, column.T
         block = image - basis @ column
-        exhausted = basis.shape[1] + width > largest
-        if exhausted or basis.shape[1] >= next_look:
+        exhausted = size + width > largest
+        if exhausted or size >= next_look:
             next_look *= LOOK_AGAIN
             ritz, weights = np.linalg.eigh((projected + projected.T) / 2)
             ritz, weights = ritz[: -count - 1 : -1], weights[:, : -count - 1 : -1]
