@@ -47,7 +47,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--output", type=Path, default=Path("demo/characters"))
-    parser.add_argument("--segments", type=int, default=8)
+    parser.add_argument("--segments", default="8")
+    parser.add_argument("--covariance", default="auto")
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
     paths = sorted(path for path in options.folder.iterdir() if path.suffix in FILES)
@@ -56,7 +57,8 @@ def main() -> int:
     print(
         f"| character | vertices | CPU s a pose | agreement learned | agreement unseen | worst unseen |\n|{'---|' * 6}"
     )
-    results = [measure(path, options.output, options.segments) for path in paths]
+    settings = ["--segments", options.segments, "--covariance", options.covariance]
+    results = [measure(path, options.output, settings) for path in paths]
     done = [result for result in results if "error" not in result]
     mean = [np.mean([result[key] for result in done]) for key in ("learned", "unseen", "worst")]
     print(f"| **mean of {len(done)} of {len(paths)}** | | | {mean[0]:.3f} | **{mean[1]:.3f}** | {mean[2]:.3f} |")
@@ -64,11 +66,11 @@ def main() -> int:
     return int(len(done) < len(paths))
 
 
-def measure(path: Path, output: Path, segments: int) -> dict[str, Any]:
+def measure(path: Path, output: Path, settings: list[str]) -> dict[str, Any]:
     """Run the demo on one file and print its row."""
     source = posed(path, output)
     command = [sys.executable, "-m", "wks_segment", "demo", "--json", "--input", str(source), "--folder", str(output)]
-    command += ["--segments", str(segments), "--learn", str(LEARNED), "--unseen", str(UNSEEN)]
+    command += [*settings, "--learn", str(LEARNED), "--unseen", str(UNSEEN)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=1800, env=one_thread())
     result: dict[str, Any] = json.loads(done.stdout) if done.stdout else {"error": done.stderr[-300:]}
     if "error" in result:

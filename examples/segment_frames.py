@@ -2,8 +2,9 @@
 
     blender --background --python-exit-code 1 --python examples/segment_frames.py -- walk.glb labelled.blend
 
-With the extension installed, Blender finds SciPy and scikit-learn in it. What the operators do in one call is written
-out here, so that you can change any step: other poses, another model, another use of the labels.
+SciPy and scikit-learn come with the extension, or with `pip install -e .` where `bpy` is a Python module. What the
+operators do in one call is written out here, so that you can change any step: other poses, another model, another use
+of the labels. Takes the largest mesh of the file.
 """
 
 import importlib
@@ -19,7 +20,7 @@ SEGMENTS = 6
 
 
 def wks_segment(part: str) -> Any:
-    """A part of the package, from the installed extension or from this repository."""
+    """A part of the package, from the installed extension or from the Python environment."""
     for name in sys.modules:
         if name.startswith("bl_ext.") and name.endswith(".wks_segment.wks_segment"):
             return importlib.import_module(f"{name}.{part}")
