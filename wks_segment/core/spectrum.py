@@ -37,9 +37,9 @@ ROUNDING = 16 * np.finfo(np.float64).eps
 """What rounding alone leaves of a residual, as a fraction of the operator's norm: felt where triangles are thin."""
 MAX_REPAIRS = 5
 """exact: rounds in which missed pairs are looked for, and residuals reduced, before the solve counts as failed."""
-BLOCK = 10
+BLOCK = 24
 """exact: columns in a block of Lanczos."""
-FIRST_LOOK = 2.9
+FIRST_LOOK = 3.6
 LOOK_AGAIN = 1.12
 """exact: convergence is looked at when there are this many basis vectors a pair, and then this many times more."""
 LANCZOS_TOLERANCE = 1e-10
@@ -206,7 +206,7 @@ def _block_lanczos(factor: NestedDissectionCholesky, known: FloatArray, count: i
     space = np.empty((n, min(int(next_look) + 2 * width, largest)), order="F")
     projected = np.zeros((0, 0))
     block = factor.solve(np.random.default_rng(0).standard_normal((n, width)))
-    block = _orthonormal_to(known, block)
+    block, coupling = _orthonormal_to(known, block), np.zeros((width, width))
     while True:
         old, size = len(projected), len(projected) + width
         if size > space.shape[1]:
@@ -214,21 +214,28 @@ def _block_lanczos(factor: NestedDissectionCholesky, known: FloatArray, count: i
         space[:, old:size] = block
         basis = space[:, :size]
         image = factor.solve(block)
-        column = basis.T @ image
+        # In exact arithmetic only the last two blocks are left in the image: a block tridiagonal matrix.
+        diagonal = block.T @ image
         projected = np.pad(projected, (0, width))
-        projected[:, old:], projected[old:, :] = column, column.T
-        block = image - basis @ column
+        projected[old:, old:] = (diagonal + diagonal.T) / 2
+        image -= block @ diagonal
+        if old:
+            projected[old:, old - width : old] = coupling
+            projected[old - width : old, old:] = coupling.T
+            image -= space[:, old - width : old] @ coupling.T
+        # Rounding brings all others back in.
+        image -= known @ (known.T @ image)
+        image -= basis @ (basis.T @ image)
+        block, coupling = np.linalg.qr(image)
         exhausted = size + width > largest
         if exhausted or size >= next_look:
             next_look *= LOOK_AGAIN
-            ritz, weights = np.linalg.eigh((projected + projected.T) / 2)
-            ritz, weights = ritz[: -count - 1 : -1], weights[:, : -count - 1 : -1]
+            ritz, weights = np.linalg.eigh(projected)
+            ritz, weights = ritz[-count:], np.ascontiguousarray(weights[:, -count:])
             # Residual of each Ritz pair: what the next block still couples to it.
-            left = np.linalg.norm(block @ weights[-width:], axis=0)
+            left = np.linalg.norm(coupling @ weights[-width:], axis=0)
             if exhausted or (left <= LANCZOS_TOLERANCE * ritz).all():
                 return basis @ weights
-        # Once more, since the first time leaves rounding errors of the size of what it took out.
-        block = np.linalg.qr(block - known @ (known.T @ block) - basis @ (basis.T @ block))[0]
 
 
 def _orthonormal_to(basis: FloatArray, block: FloatArray) -> FloatArray:
@@ -240,9 +247,9 @@ def _orthonormal_to(basis: FloatArray, block: FloatArray) -> FloatArray:
 
 def _rayleigh_ritz(operator: csr_matrix, basis: FloatArray, known: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Best eigenpairs of A within the span of a basis, orthogonal to the `known` vectors."""
-    orthonormal = _orthonormal_to(known, basis)
-    values, rotation = np.linalg.eigh(orthonormal.T @ (operator @ orthonormal))
-    return values, orthonormal @ rotation
+    basis = basis - known @ (known.T @ basis)
+    values, rotation = eigh(basis.T @ (operator @ basis), basis.T @ basis)
+    return values, basis @ rotation
 
 
 def _widest_gap(values: FloatArray, count: int) -> int:
