@@ -63,6 +63,18 @@ def test_fast_pairs_give_nearly_the_same_signature():
         assert np.linalg.norm(fast - reference) < 0.007 * np.linalg.norm(reference)
 
 
+def test_fast_pairs_stand_very_thin_triangles():
+    mesh = creature(0.3)
+    vertices = mesh.vertices.copy()
+    ends = mesh.faces[::40, :2]
+    vertices[ends[:, 0]] = vertices[ends[:, 1]] + 1e-5 * (vertices[ends[:, 0]] - vertices[ends[:, 1]])
+    thin = TriangleMesh(vertices, mesh.faces)
+    values, functions = eigenpairs(thin, 150, accuracy="fast")
+    assert (np.diff(values) >= 0).all()
+    fast, reference = wave_kernel_signature(values, functions), wave_kernel_signature(*exact(thin, 150))
+    assert np.linalg.norm(fast - reference) < 0.007 * np.linalg.norm(reference)
+
+
 @pytest.mark.parametrize("kind", [wave_kernel_signature, heat_kernel_signature])
 def test_rotation_translation_and_scale_change_nothing(kind):
     mesh = creature(0.5, 3)

@@ -11,9 +11,10 @@ from scipy.sparse import csc_matrix, csr_matrix, diags
 
 from .mesh import FloatArray, TriangleMesh
 
-MIN_DOUBLE_AREA = 1e-6
-"""Least double area of a triangle in the cotangents, as a fraction of its longest edge squared."""
-MIN_MASS = 1e-6
+MIN_DOUBLE_AREA = 1e-4
+"""Least double area of a triangle in the cotangents, as a fraction of its longest edge squared: a thinner one glues its
+corners together no more than that, which is enough, and leaves single precision its digits."""
+MIN_MASS = 1e-3
 """Least mass of a vertex, as a fraction of the mean."""
 
 

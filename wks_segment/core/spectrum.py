@@ -57,6 +57,8 @@ LARGEST_CHANGE = 0.03
 LARGEST_CHANGE_OF_BOTH = 0.1
 """fast: relative change of a function by a correction, up to which it was the last one; the latter where functions and
 corrections together spanned the subspace. The signature is then within 0.1 to 0.4 % of the exact one."""
+LEAST_VALUE = 1e-6
+"""fast: a first value below this fraction of the last one is rounding, or needs more digits than there are."""
 LEAST_DIRECTION = 1e-5
 """fast: squared size of a direction among the corrections, relative to the largest, below which it is rounding."""
 MAX_CORRECTIONS = 5
@@ -289,7 +291,7 @@ def _fast(problem: _Problem, count: int) -> tuple[FloatArray, FloatArray]:
             tried = True
             coarse = _coarse_pairs(problem, count, n_cells)
             values, vectors, converged = _correct(problem, factor, *coarse, count)
-            if converged:
+            if converged and values[0] > LEAST_VALUE * values[-1]:
                 return values, vectors
             n_cells *= 2
     except NotPositiveDefiniteError:
