@@ -7,6 +7,8 @@ import bmesh
 import bpy
 import numpy as np
 
+from wks_segment.blender.labels import NOTE, has_labels
+
 LIMBS = np.array([[1.0, 0.0, 0.2], [-0.5, 0.8, 0.1], [-0.4, -0.7, -0.5]])
 """Directions of the three limbs of the test character."""
 LENGTHS = np.array([2.2, 1.5, 1.0])
@@ -209,3 +211,13 @@ class Outcome:
 
     def __repr__(self):
         return f"exit code {self.code}\nstandard output:\n{self.out}\nstandard error:\n{self.err}"
+
+
+def read_labels(mesh):
+    """(p,) components that were written to the polygons of a mesh, found by the note on it; None if there are none."""
+    name = mesh[NOTE].get("faces", "") if has_labels(mesh) else ""
+    if name not in mesh.attributes:
+        return None
+    labels = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.attributes[name].data.foreach_get("value", labels)
+    return labels

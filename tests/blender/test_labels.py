@@ -3,9 +3,9 @@
 import bpy
 import numpy as np
 import pytest
-from builders import changes, coordinates, limbed, mesh_object, numbers, snapshot
+from builders import changes, coordinates, limbed, mesh_object, numbers, read_labels, snapshot
 
-from wks_segment.blender.labels import clear_labels, read_labels, write_labels
+from wks_segment.blender.labels import clear_labels, write_labels
 from wks_segment.blender.palette import palette
 
 pytestmark = pytest.mark.usefixtures("scene")

@@ -12,12 +12,12 @@ from builders import (
     limbed_poses,
     limbed_rigged,
     mesh_object,
+    read_labels,
     scene_snapshot,
     select,
     snapshot,
 )
 
-from wks_segment.blender import labels as writer
 from wks_segment.blender import operators
 from wks_segment.blender import poses as reader
 from wks_segment.blender.poses import Character
@@ -500,7 +500,7 @@ def test_model_stays_with_the_blend_file(learned, settings, tmp_path):
     select(first)
     assert OPS.apply() == {"FINISHED"}
     OPS.clear()
-    assert writer.read_labels(first.data) is None
+    assert read_labels(first.data) is None
 
 
 # Settings and panel

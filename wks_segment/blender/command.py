@@ -12,6 +12,7 @@ from typing import Any
 import bpy
 
 from ..core import PoseSegmentation
+from ..core.segmentation import Progress
 from . import demo, files, tasks
 from . import poses as reader
 from .characters import Character, armature_of, group, mesh_objects
@@ -19,7 +20,7 @@ from .errors import UserError
 from .picture import Tile, render_poses
 from .poses import Pose
 from .settings import WKSSegmentSettings
-from .tasks import Progress, Report
+from .tasks import Report
 from .terminal import only_result_on_stdout, table, terminal_progress
 
 OPTIONS = {

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ..core.mesh import FloatArray, IntArray
+from ..core.segmentation import Progress
 from . import files, tasks
 from . import poses as reader
 from .characters import Character
@@ -16,7 +17,7 @@ from .creature import FIRST_FRAME, LAST_FRAME, build_creature
 from .errors import UserError
 from .picture import Tile, render_poses
 from .settings import WKSSegmentSettings
-from .tasks import Progress, Report
+from .tasks import Report
 
 SUFFIXES = {"scene": ".blend", "picture": ".png", "model": ".json"}
 

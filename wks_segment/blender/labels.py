@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.mesh import IntArray
-from .palette import colors_of
+from .palette import colors_of, linear
 
 FACES = "wks_segment"
 VERTICES = "wks_segment_vertex"
@@ -73,16 +73,6 @@ def has_labels(mesh: bpy.types.Mesh) -> bool:
     return NOTE in mesh and hasattr(mesh[NOTE], "to_dict")
 
 
-def read_labels(mesh: bpy.types.Mesh) -> IntArray | None:
-    """(p,) components of the polygons that were written to a mesh; None if there are none."""
-    attribute = mesh.attributes.get(mesh[NOTE].get("faces", "")) if has_labels(mesh) else None
-    if attribute is None:
-        return None
-    labels = np.empty(len(mesh.polygons), dtype=np.int32)
-    attribute.data.foreach_get("value", labels)
-    return labels.astype(np.int64)
-
-
 def _write_ints(mesh: bpy.types.Mesh, key: str, name: str, domain: str, values: NDArray[np.integer[Any]]) -> None:
     """Add an int attribute and note the name that it got: a name that is taken gets a number."""
     attribute = mesh.attributes.new(name, "INT", domain)
@@ -132,9 +122,7 @@ def _material(component: int) -> bpy.types.Material:
             return material
     material = bpy.data.materials.new(f"Segment {component + 1}")
     material[COMPONENT] = component
-    srgb = colors_of(np.array([component]))[0]
-    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-    color = (*linear.tolist(), 1.0)
+    color = (*linear(colors_of(np.array([component]))[0]).tolist(), 1.0)
     material.diffuse_color = color
     if bpy.app.version < (5, 0, 0):  # from then on always true, and touching it warns
         material.use_nodes = True

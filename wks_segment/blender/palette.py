@@ -61,7 +61,11 @@ def colors_of(components: IntArray) -> FloatArray:
     return palette()[components % MAX_COLOURS]
 
 
+def linear(srgb: FloatArray) -> FloatArray:
+    """(…, 3) sRGB colours in linear light, as materials take them."""
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+
+
 def oklab(srgb: FloatArray) -> FloatArray:
     """(…, 3) sRGB colours in OKLab, where a distance is what the eye sees."""
-    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-    return np.cbrt(linear @ _TO_CONES.T) @ _TO_LAB.T
+    return np.cbrt(linear(srgb) @ _TO_CONES.T) @ _TO_LAB.T

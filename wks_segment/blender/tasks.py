@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
@@ -13,14 +13,13 @@ from scipy.spatial import cKDTree
 
 from ..core import PoseSegmentation, PoseSignature, SpectrumError, weld
 from ..core.mesh import IntArray
+from ..core.segmentation import Progress
 from . import poses as reader
 from .characters import Character, armature_of, group, mesh_objects
 from .errors import UserError
 from .labels import write_labels
 from .poses import Pose
 from .settings import WKSSegmentSettings
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass
@@ -141,14 +140,17 @@ def describe(
 ) -> list[PoseSignature]:
     """Signature of each pose; poses that are one and the same surface are computed once."""
     described: list[PoseSignature] = []
+    # One surface in all poses of a mesh, also where pieces of it meet in some.
+    welded: dict[int, IntArray] = {}
     for i, pose in enumerate(poses):
+        first = next(j for j, other in enumerate(poses) if pose.is_mesh_of(other))
+        if first == i:
+            welded[i] = weld(*(other.mesh for other in poses if pose.is_mesh_of(other)))
         progress(f"Signature of {pose.name} ({i + 1} of {len(poses)})", share * i / len(poses))
         twin = next((j for j in range(i) if pose.is_like(poses[j])), None)
         with report.stage("signature"):
             try:
-                # One surface in all poses of a mesh, also where pieces of it meet in some.
-                same_mesh = [other.mesh for other in poses if pose.is_mesh_of(other)]
-                described.append(model.describe(pose.mesh, weld(*same_mesh)) if twin is None else described[twin])
+                described.append(model.describe(pose.mesh, welded[first]) if twin is None else described[twin])
             except (ValueError, SpectrumError) as error:
                 raise UserError(f'"{pose.name}": {error}') from error
     return described

@@ -7,8 +7,9 @@ from contextlib import contextmanager
 
 import bpy
 
+from ...core.segmentation import Progress
 from ..characters import mesh_objects
-from ..tasks import Progress, Report
+from ..tasks import Report
 
 LOOK = "VERTEX"
 """Color mode of solid shading that shows the color attribute."""
