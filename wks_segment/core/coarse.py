@@ -6,11 +6,14 @@ only rich enough; inverse iteration on the surface itself does the rest (`spectr
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix, diags, identity
+from scipy.linalg import cholesky, eigh, solve_triangular
+from scipy.sparse import coo_matrix, csr_matrix, diags, identity, vstack
 from scipy.sparse.csgraph import connected_components
 
-from .mesh import FloatArray, IntArray, TriangleMesh
+from .mesh import FloatArray, IntArray
 
 HEAVIEST = 1.5
 """A cell of more than this many times the mean mass is split: on a thin limb, a cube of space holds a whole tube."""
@@ -18,14 +21,16 @@ LIGHTEST = 0.2
 """A cell of less than this many times the mean mass joins a neighbour, if it does not become too heavy."""
 SPLITS = 5
 """Rounds of splitting, each into half the size."""
-REACH = 1.8
-"""Radius of a cell's function, in square roots of a cell's mean area."""
+REACH, REACH_SMOOTHED = 2.0, 2.6
+"""Radius of a cell's function, in square roots of a cell's mean area. Wider ones are more accurate and overlap more."""
+DAMPING = np.float32(0.66)
+"""Of a step of smoothing, in units of the inverse diagonal."""
 LEAST_WEIGHT = 1e-3
 """Weight of a vertex's own cell if even its middle is out of reach."""
-RIDGE = 1e-2
-"""Pulls a fit without enough neighbours towards a constant."""
-DAMPING = 0.66
-"""Of the smoothing step on the functions, in units of the inverse diagonal."""
+RIDGE = 1e-3
+"""Decides what neighbours do not: across a flat surface, or where there are too few, a fit is constant."""
+ROWS = 50_000
+"""Vertices whose functions are fitted at once."""
 
 
 def edges_of(matrix: csr_matrix) -> tuple[IntArray, IntArray]:
@@ -93,52 +98,114 @@ def _join_light_cells(
     return result.astype(np.int64), len(kept)
 
 
-def prolongation(mesh: TriangleMesh, masses: FloatArray, stiffness: csr_matrix, n_cells: int) -> csr_matrix:
-    """(n, about n_cells) sparse matrix: from values at cells to smooth functions on the surface.
+def coarse_eigenpairs(level: Level, n_zero: int, count: int) -> tuple[FloatArray, FloatArray]:
+    """The lowest non-zero eigenpairs of a level that is small enough to be solved densely, at most `count`.
 
-    Moving least squares (Lancaster and Salkauskas, 1981) in the tangent plane of each vertex, over its own and the
-    adjacent cells, with Wendland's weights: sums to 1 and carries over functions that are linear there. One damped
-    Jacobi step takes the roughness out of the functions.
+    Returns (k,) values and an (n, k) array of vectors in float32; the first `n_zero` pairs are left out.
 
-    Parameters
-    ----------
-    mesh : TriangleMesh
-        Of area 1, with n vertices.
-    masses : (n,) array
-    stiffness : (n, n) sparse matrix
-    n_cells : int
-        How many cells to aim at.
+    Raises
+    ------
+    scipy.linalg.LinAlgError
+        If single precision does not suffice.
     """
-    n = mesh.n_vertices
-    edges = edges_of(stiffness)
-    cell, count = cluster(mesh.vertices, edges, masses, n_cells)
-    middle = _middle_vertices(mesh.vertices, masses, cell, count)
-    row, column = _own_and_adjacent(cell, count, edges)
+    mass = level.mass.toarray()
+    mass[np.diag_indices_from(mass)] *= 1 + np.finfo(np.float32).eps
+    factor = cholesky(mass, lower=True)
+    half = solve_triangular(factor, level.stiffness.toarray(), lower=True)
+    reduced = solve_triangular(factor, half.T, lower=True)
+    values, weights = eigh((reduced + reduced.T) / 2, subset_by_index=[0, min(len(mass), n_zero + count) - 1])
+    vectors = solve_triangular(factor, weights[:, n_zero:], lower=True, trans="T")
+    return values[n_zero:].astype(np.float64), np.ascontiguousarray(vectors)
 
-    across = mesh.vertices[middle[column]] - mesh.vertices[row]
-    reach = REACH / np.sqrt(n_cells)
-    distance = np.linalg.norm(across, axis=1) / reach
+
+@dataclass(frozen=True)
+class Level:
+    """The eigenproblem S x = λ M x on a surface, or restricted to the functions of its cells.
+
+    Attributes
+    ----------
+    positions : (n, 3) array
+        Of the vertices, or the vertices that stand for the cells, of a surface of area 1.
+    edges : two (e,) int arrays
+        The ends of what is adjacent.
+    areas : (n,) array
+        Area that belongs to each.
+    stiffness, mass : (n, n) sparse matrices of float32
+    """
+
+    positions: FloatArray
+    edges: tuple[IntArray, IntArray]
+    areas: FloatArray
+    stiffness: csr_matrix
+    mass: csr_matrix
+
+    def coarsened(self, n_cells: int, smoothed: bool = False) -> tuple[csr_matrix, Level]:
+        """Prolongation to this level from one of about `n_cells` cells, and that level (Galerkin's restriction).
+
+        The prolongation is an (n, number of cells) sparse matrix: from values at cells to smooth functions.
+        """
+        cell, count = cluster(self.positions, self.edges, self.areas, n_cells)
+        middle = _middle_vertices(self.positions, self.areas, cell, count)
+        adjacent = _adjacency(cell, count, self.edges)
+        around = csr_matrix(adjacent @ adjacent)
+        blocks = [
+            _moving_least_squares(
+                self.positions[start : start + ROWS],
+                cell[start : start + ROWS],
+                self.positions[middle],
+                around,
+                (REACH_SMOOTHED if smoothed else REACH) / np.sqrt(n_cells),
+            )
+            for start in range(0, len(cell), ROWS)
+        ]
+        prolongation = csr_matrix(vstack(blocks, format="csr"))
+        if smoothed:
+            inverse_diagonal = 1 / np.maximum(self.stiffness.diagonal(), np.finfo(np.float32).tiny)
+            prolongation = csr_matrix(
+                prolongation - diags(DAMPING * inverse_diagonal) @ (self.stiffness @ prolongation)
+            )
+        restricted = [csr_matrix(prolongation.T @ (full @ prolongation)) for full in (self.stiffness, self.mass)]
+        return prolongation, Level(
+            self.positions[middle], edges_of(adjacent), _sums(self.areas, cell, count), *restricted
+        )
+
+
+def _moving_least_squares(
+    positions: FloatArray, cell: IntArray, middles: FloatArray, around: csr_matrix, reach: float
+) -> csr_matrix:
+    """(len(positions), len(middles)) weights that carry values at the middles of cells to positions on the surface.
+
+    Moving least squares (Lancaster and Salkauskas, 1981) over the cells `around` a position's own, with Wendland's
+    weights: they sum to 1 and carry over functions that are linear in space.
+    """
+    row, column = _pairs(cell, around)
+    across = (middles[column] - positions[row]) / reach
+    distance = np.sqrt(np.einsum("ij,ij->i", across, across))
     weight = np.where(distance < 1, (1 - distance) ** 4 * (4 * distance + 1), 0.0)
     weight = np.where(column == cell[row], np.maximum(weight, LEAST_WEIGHT), weight)
     near = weight > 0
-    row, column, across, weight = row[near], column[near], across[near] / reach, weight[near]
-    tangent, other = _tangents(_normals(mesh))
-    u = np.einsum("ij,ij->i", across, tangent[row])
-    v = np.einsum("ij,ij->i", across, other[row])
+    row, column, weight = row[near], column[near], weight[near]
+    x, y, z = across[near].T
+    first = np.searchsorted(row, np.arange(len(positions) + 1))
 
     def moment(values: FloatArray) -> FloatArray:
-        return _sums(values, row, n)
+        return np.asarray(np.add.reduceat(values, first[:-1]))
 
-    # The constant term of the weighted fit of 1, u, v, by Cramer's rule.
-    w, wu, wv = moment(weight), moment(weight * u), moment(weight * v)
-    wuu, wvv, wuv = moment(weight * u * u), moment(weight * v * v), moment(weight * u * v)
-    wuu, wvv = wuu + RIDGE * w, wvv + RIDGE * w
-    constant, by_u, by_v = wuu * wvv - wuv**2, wv * wuv - wu * wvv, wu * wuv - wv * wuu
-    determinant = w * constant + wu * by_u + wv * by_v
-    values = weight * (constant[row] + by_u[row] * u + by_v[row] * v) / determinant[row]
-    basis = csr_matrix((values, (row, column)), shape=(n, count))
-    inverse_diagonal = 1 / np.maximum(stiffness.diagonal(), np.finfo(float).tiny)
-    return csr_matrix(basis - DAMPING * (diags(inverse_diagonal) @ (stiffness @ basis)))
+    # The constant term of the weighted fit of 1, x, y, z: the inverse of the 3 × 3 second moments by its adjugate.
+    wx, wy, wz = weight * x, weight * y, weight * z
+    w, mx, my, mz = moment(weight), moment(wx), moment(wy), moment(wz)
+    ridge = RIDGE * w
+    xx, yy, zz = moment(wx * x) + ridge, moment(wy * y) + ridge, moment(wz * z) + ridge
+    xy, xz, yz = moment(wx * y), moment(wx * z), moment(wy * z)
+    ixx, iyy, izz = yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy
+    ixy, ixz, iyz = xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz
+    determinant = xx * ixx + xy * ixy + xz * ixz
+    slope_x = (ixx * mx + ixy * my + ixz * mz) / determinant
+    slope_y = (ixy * mx + iyy * my + iyz * mz) / determinant
+    slope_z = (ixz * mx + iyz * my + izz * mz) / determinant
+    rest = w - slope_x * mx - slope_y * my - slope_z * mz
+    values = (weight - slope_x[row] * wx - slope_y[row] * wy - slope_z[row] * wz) / rest[row]
+    return csr_matrix((values.astype(np.float32), column, first), shape=(len(positions), len(middles)))
 
 
 def _middle_vertices(positions: FloatArray, masses: FloatArray, cell: IntArray, count: int) -> IntArray:
@@ -150,28 +217,15 @@ def _middle_vertices(positions: FloatArray, masses: FloatArray, cell: IntArray, 
     return order[np.searchsorted(cell[order], np.arange(count))]
 
 
-def _own_and_adjacent(cell: IntArray, count: int, edges: tuple[IntArray, IntArray]) -> tuple[IntArray, IntArray]:
-    """Pairs of a vertex and a cell: its own, and those that touch its own."""
+def _adjacency(cell: IntArray, count: int, edges: tuple[IntArray, IntArray]) -> csr_matrix:
+    """(count, count) matrix with an entry for each cell itself and for each that touches it."""
     a, b = cell[edges[0]], cell[edges[1]]
     touch = csr_matrix((np.ones(len(a), dtype=np.int8), (a, b)), shape=(count, count))
-    touch = csr_matrix(touch + touch.T + identity(count, dtype=np.int8, format="csr")) != 0
-    size = np.diff(touch.indptr)[cell]
-    start = np.repeat(touch.indptr[cell] - np.concatenate([[0], np.cumsum(size)[:-1]]), size)
-    return np.repeat(np.arange(len(cell)), size), touch.indices[start + np.arange(size.sum())]
+    return csr_matrix(csr_matrix(touch + touch.T + identity(count, dtype=np.int8, format="csr")) != 0)
 
 
-def _normals(mesh: TriangleMesh) -> FloatArray:
-    """(n, 3) unit normals; zero where the faces around a vertex cancel."""
-    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
-    of_faces = np.repeat(np.cross(b - a, c - a), 3, axis=0)
-    at = mesh.faces.ravel()
-    normals = np.stack([_sums(x, at, mesh.n_vertices) for x in of_faces.T], axis=1)
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
-
-
-def _tangents(normals: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Two unit vectors at right angles to each normal and each other."""
-    helper = np.where(np.abs(normals[:, :1]) < 0.6, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-    tangent = np.cross(normals, helper)
-    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), np.finfo(float).tiny)
-    return tangent, np.cross(normals, tangent)
+def _pairs(cell: IntArray, adjacent: csr_matrix) -> tuple[IntArray, IntArray]:
+    """Pairs of a vertex and a cell: its own, and those that touch its own."""
+    size = np.diff(adjacent.indptr)[cell]
+    start = np.repeat(adjacent.indptr[cell] - np.concatenate([[0], np.cumsum(size)[:-1]]), size)
+    return np.repeat(np.arange(len(cell)), size), adjacent.indices[start + np.arange(size.sum())]

@@ -10,7 +10,7 @@ from scipy.sparse import coo_matrix, csr_matrix, diags
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from .cholesky import NestedDissectionCholesky
+from .factor import NestedDissectionFactor
 from .laplacian import stiffness_matrix, unit_area_masses
 from .mesh import FloatArray, IntArray, TriangleMesh
 
@@ -54,7 +54,7 @@ def smooth_posteriors(mesh: TriangleMesh, posteriors: FloatArray, length: float)
     """
     masses = unit_area_masses(mesh)
     system = csr_matrix(diags(masses) + length**2 * stiffness_matrix(mesh))
-    factor = NestedDissectionCholesky(system, mesh.vertices, np.float64)
+    factor = NestedDissectionFactor(system, mesh.vertices, np.float64)
     return factor.solve(masses[:, None] * posteriors)
 
 

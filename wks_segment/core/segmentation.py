@@ -19,8 +19,8 @@ from .laplacian import unit_area_masses
 from .mesh import FloatArray, IntArray, TriangleMesh
 from .mixture import CovarianceType, GaussianMixture, fit_mixture
 from .regions import FaceAdjacency, connected_regions, merge_crumbs, smooth_posteriors
-from .signature import wave_kernel_signature
-from .spectrum import Accuracy, eigenpairs
+from .signature import wave_kernel_signature_of
+from .spectrum import Accuracy
 from .surface import Surface, indicator, prepare_surface
 
 Scaling = Literal["log", "raw"]
@@ -125,8 +125,7 @@ class PoseSegmentation:
         self._check_parameters()
         surface = prepare_surface(mesh, VERTICES_PER_PAIR * self.n_eigenpairs, welded)
         n_pairs = self.n_eigenpairs + surface.n_components - 1
-        values, functions = eigenpairs(surface.mesh, n_pairs, self.accuracy)
-        signature = wave_kernel_signature(values, functions, self.n_energies)
+        signature = wave_kernel_signature_of(surface.mesh, n_pairs, self.n_energies, self.accuracy)
         return PoseSignature(surface, signature, self.n_eigenpairs)
 
     def fit(self, meshes: Sequence[TriangleMesh | PoseSignature], progress: Progress | None = None) -> PoseSegmentation:

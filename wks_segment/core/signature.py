@@ -6,10 +6,13 @@ shape analysis" (2011). Heat Kernel Signature: Sun, Ovsjanikov and Guibas (2009)
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .mesh import FloatArray, IntArray
+from .mesh import FloatArray, TriangleMesh
+from .spectrum import Accuracy, Panels, eigenpair_panels
 
 ZERO_EIGENVALUE = 1e-8
 """An eigenvalue up to this fraction of the largest one counts as zero: a constant on a component."""
@@ -47,6 +50,26 @@ def wave_kernel_signature(values: ArrayLike, functions: ArrayLike, n_energies: i
         If the shapes do not fit, or fewer than two eigenvalues are above zero.
     """
     values, functions = _checked_pairs(values, functions)
+    return _squares_times(_whole(functions), _energy_weights(values, n_energies), functions.shape[0])
+
+
+def wave_kernel_signature_of(
+    mesh: TriangleMesh,
+    n_pairs: int = 300,
+    n_energies: int = 100,
+    accuracy: Accuracy = "fast",
+    progress: Callable[[float], None] | None = None,
+) -> FloatArray:
+    """`wave_kernel_signature` of the eigenpairs of a mesh, which are not kept: they would take more memory than it.
+
+    For parameters and errors see `eigenpairs` and `wave_kernel_signature`.
+    """
+    values, place, panels = eigenpair_panels(mesh, n_pairs, accuracy, progress)
+    return _squares_times(panels, _energy_weights(values, n_energies), mesh.n_vertices)[place]
+
+
+def _energy_weights(values: FloatArray, n_energies: int) -> FloatArray:
+    """(k, n_energies) share of each eigenpair in the signature at each energy; zero modes have none."""
     if n_energies < 2:
         raise ValueError(f"n_energies must be at least 2, not {n_energies}")
     kept = values > ZERO_EIGENVALUE * values.max()
@@ -61,8 +84,9 @@ def wave_kernel_signature(values: ArrayLike, functions: ArrayLike, n_energies: i
         )
     sigma = BAND_WIDTH * (last - first) / n_energies
     energies = np.linspace(first, last, n_energies)
-    weights = np.exp(-((energies - logs[:, None]) ** 2) / (2 * sigma**2))
-    return _squares_times(functions, np.flatnonzero(kept), weights / weights.sum(axis=0))
+    weights = np.zeros((len(values), n_energies))
+    weights[kept] = np.exp(-((energies - logs[:, None]) ** 2) / (2 * sigma**2))
+    return np.asarray(weights / weights.sum(axis=0))
 
 
 def heat_kernel_signature(
@@ -95,7 +119,7 @@ def heat_kernel_signature(
             raise ValueError("the signature needs an eigenvalue above zero")
         times = np.geomspace(4 * np.log(10) / above[-1], 4 * np.log(10) / above[0], n_times)
     weights = np.exp(-np.outer(values, np.asarray(times, dtype=np.float64)))
-    return _squares_times(functions, np.arange(len(values)), weights)
+    return _squares_times(_whole(functions), weights, functions.shape[0])
 
 
 def _checked_pairs(values: ArrayLike, functions: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -109,11 +133,20 @@ def _checked_pairs(values: ArrayLike, functions: ArrayLike) -> tuple[FloatArray,
     return values, functions
 
 
-def _squares_times(functions: FloatArray, columns: IntArray, weights: FloatArray) -> FloatArray:
-    """functions[:, columns]² @ weights, a block of rows at a time."""
-    weights = weights.astype(functions.dtype)  # single precision stays single
-    result = np.empty((len(functions), weights.shape[1]), dtype=functions.dtype)
-    for start in range(0, len(functions), ROWS):
-        block = functions[start : start + ROWS, columns]
-        result[start : start + ROWS] = block**2 @ weights
+def _whole(functions: FloatArray) -> Panels:
+    """All functions as one panel."""
+    return iter([(slice(0, functions.shape[1]), functions)])
+
+
+def _squares_times(panels: Panels, weights: FloatArray, n_vertices: int) -> FloatArray:
+    """functions² @ weights of functions that come in panels of columns, a block of rows at a time."""
+    result: FloatArray | None = None
+    for columns, panel in panels:
+        of_panel = weights[columns].astype(panel.dtype)  # single precision stays single
+        if result is None:
+            result = np.zeros((n_vertices, weights.shape[1]), dtype=panel.dtype)
+        for start in range(0, n_vertices, ROWS):
+            rows = slice(start, start + ROWS)
+            result[rows] += panel[rows] ** 2 @ of_panel
+    assert result is not None
     return result

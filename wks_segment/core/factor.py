@@ -1,4 +1,4 @@
-"""A sparse Cholesky factorisation for surfaces: fast with hundreds of right-hand sides at once.
+"""A sparse symmetric factorisation for surfaces: fast with hundreds of right-hand sides at once.
 
 Multifrontal (Duff and Reid, 1983) on a nested dissection of the vertices by their positions (George, 1973): every
 elimination is dense, so that factor and solve are matrix products. Solving for 380 columns on 40,000 vertices takes a
@@ -18,10 +18,12 @@ from .mesh import BoolArray, FloatArray, IntArray
 
 LEAF = 120
 """Vertices below which a part is eliminated as a whole."""
+WORK_COLUMNS = 64
+"""Columns of work space with which LAPACK factorises an indefinite front in blocks."""
 
 
-class NotPositiveDefiniteError(ArithmeticError):
-    """The matrix has an eigenvalue that is not above zero, to the precision of the factorisation."""
+class SingularError(ArithmeticError):
+    """A block of the matrix has no inverse, to the precision of the factorisation."""
 
 
 @dataclass
@@ -37,69 +39,86 @@ class _Front:
     outside: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
 
-class NestedDissectionCholesky:
-    """L Lᵀ = P A Pᵀ of a sparse, symmetric, positive definite matrix whose graph lies in space.
+class NestedDissectionFactor:
+    """L D Lᵀ = P A Pᵀ of a sparse symmetric matrix whose graph lies in space, D of one dense block a front.
+
+    The matrix need not be positive definite: rows change places within a front only, which is stable for a shifted
+    Laplacian unless the shift hits an eigenvalue of a part of the surface. Check residuals where it matters.
 
     Parameters
     ----------
     matrix : (n, n) sparse matrix
-        Symmetric and positive definite.
+        Symmetric.
     positions : (n, 3) array
         Where the unknowns lie; neighbours in the matrix should be near to each other.
     dtype : float32 or float64
         Precision of the factors and of `solve`.
 
+    Attributes
+    ----------
+    n_negative : int
+        Number of negative eigenvalues. The inertia of a matrix is that of a block plus that of its Schur complement
+        (Haynsworth, 1968).
+
     Raises
     ------
-    NotPositiveDefiniteError
-        If the matrix is not positive definite in this precision.
+    SingularError
+        If a front has no inverse in this precision.
     """
 
     def __init__(self, matrix: csr_matrix, positions: FloatArray, dtype: type[Any] = np.float32) -> None:
         self.dtype = dtype
+        self.n_negative = 0
         self._order, fronts = nested_dissection(csr_matrix(matrix), positions)
         lower = tril(csr_matrix(matrix)[self._order][:, self._order], format="csc").astype(dtype)
         lower.sort_indices()
-        self._factors = [(front, *factor) for front, factor in _eliminate(lower, fronts, dtype)]
+        place = np.empty(lower.shape[0], dtype=np.int64)
+        updates: dict[int, FloatArray] = {}
+        self._factors: list[tuple[_Front, FloatArray, FloatArray]] = []
+        for front in fronts:
+            block = _assemble(lower, front, updates, place, dtype)
+            size = front.last - front.first
+            inverse, n_negative = _inverse(block[:size, :size])
+            self.n_negative += n_negative
+            below = block[size:, :size]
+            coupling = below @ inverse
+            if len(front.outside):
+                updates[id(front)] = block[size:, size:] - coupling @ below.T
+            self._factors.append((front, inverse, coupling))
 
     def solve(self, right: FloatArray) -> FloatArray:
         """(n, k) solution of A X = right for (n, k) right-hand sides."""
         x: FloatArray = right[self._order].astype(self.dtype, copy=False)
-        for front, inverse, coupling in self._factors:
-            own = slice(front.first, front.last)
-            x[own] = inverse @ x[own]
+        for front, _, coupling in self._factors:
             if len(front.outside):
-                x[front.outside] -= coupling @ x[own]
+                x[front.outside] -= coupling @ x[front.first : front.last]
         for front, inverse, coupling in reversed(self._factors):
             own = slice(front.first, front.last)
-            rest = x[own]
+            part = inverse @ x[own]
             if len(front.outside):
-                rest = rest - coupling.T @ x[front.outside]
-            x[own] = inverse.T @ rest
+                part -= coupling.T @ x[front.outside]
+            x[own] = part
         result = np.empty_like(x)
         result[self._order] = x
         return result
 
 
-def eigenvalues_below_zero(matrix: csr_matrix, positions: FloatArray) -> int:
-    """Number of negative eigenvalues of a sparse symmetric matrix: its inertia, front by front.
-
-    Haynsworth (1968): the inertia of a matrix is that of a block plus that of its Schur complement.
-    """
-    order, fronts = nested_dissection(csr_matrix(matrix), positions)
-    lower = tril(csr_matrix(matrix)[order][:, order], format="csc")
-    lower.sort_indices()
-    count = 0
-    place = np.empty(lower.shape[0], dtype=np.int64)
-    updates: dict[int, FloatArray] = {}
-    for front in fronts:
-        block = _assemble(lower, front, updates, place, np.float64)
-        size = front.last - front.first
-        pivots, vectors = np.linalg.eigh(block[:size, :size], UPLO="L")
-        count += int(np.count_nonzero(pivots < 0))
-        projected = block[size:, :size] @ vectors
-        updates[id(front)] = block[size:, size:] - (projected / pivots) @ projected.T
-    return count
+def _inverse(block: FloatArray) -> tuple[FloatArray, int]:
+    """Inverse of a dense symmetric block of which the lower half is given, and its number of negative eigenvalues."""
+    if not len(block):
+        return block, 0
+    factorise, invert, factorise_indefinite = get_lapack_funcs(("potrf", "trtri", "sytrf"), (block,))
+    factor, failed = factorise(block, lower=1, clean=1)
+    if not failed:
+        half, failed = invert(factor, lower=1, overwrite_c=1)
+        return half.T @ half, 0
+    # Not positive definite. A pivot is one number, or a block of two by two, marked below zero, of which one eigenvalue
+    # is negative (Bunch and Kaufman, 1977).
+    factor, pivots, failed = factorise_indefinite(block, lower=1, lwork=WORK_COLUMNS * len(block))
+    if failed:
+        raise SingularError(f"a front of {len(block)} unknowns has no inverse")
+    n_negative = np.count_nonzero(factor.diagonal()[pivots > 0] < 0) + np.count_nonzero(pivots < 0) // 2
+    return np.linalg.inv(np.tril(block) + np.tril(block, -1).T), int(n_negative)
 
 
 def nested_dissection(matrix: csr_matrix, positions: FloatArray) -> tuple[IntArray, list[_Front]]:
@@ -162,28 +181,3 @@ def _assemble(
         at = place[child.outside]
         block[at[:, None], at] += updates.pop(id(child))
     return block
-
-
-def _eliminate(
-    lower: csr_matrix, fronts: list[_Front], dtype: type[Any]
-) -> list[tuple[_Front, tuple[FloatArray, FloatArray]]]:
-    """For each front the inverse of its dense factor, and its coupling to what is outside."""
-    factorise, invert = get_lapack_funcs(("potrf", "trtri"), dtype=dtype)
-    place = np.empty(lower.shape[0], dtype=np.int64)
-    updates: dict[int, FloatArray] = {}
-    factors = []
-    for front in fronts:
-        block = _assemble(lower, front, updates, place, dtype)
-        size = front.last - front.first
-        inverse: FloatArray = np.zeros((0, 0), dtype)
-        if size:
-            factor, failed = factorise(block[:size, :size], lower=1, clean=1)
-            if failed:
-                raise NotPositiveDefiniteError(f"pivot {front.first + failed - 1} is not above zero")
-            inverse, failed = invert(factor, lower=1)
-            if failed:
-                raise NotPositiveDefiniteError(f"pivot {front.first + failed - 1} is zero")
-        coupling = block[size:, :size] @ inverse.T
-        updates[id(front)] = block[size:, size:] - coupling @ coupling.T
-        factors.append((front, (inverse, coupling)))
-    return factors
