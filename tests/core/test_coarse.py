@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, diags
 from shapes import creature, grid, icosphere, together
 
 from wks_segment.core import TriangleMesh, stiffness_matrix
-from wks_segment.core.coarse import HEAVIEST, cluster, edges_of, prolongation
+from wks_segment.core.coarse import HEAVIEST, Level, _components, cluster, coarse_eigenpairs, edges_of
 
 
 def unit_area(mesh):
@@ -24,8 +24,6 @@ def test_cells_are_many_enough_connected_and_not_heavy(mesh):
     mass = np.bincount(cell, weights=mesh.vertex_areas)
     assert mass.max() <= HEAVIEST / 200 + mesh.vertex_areas.max()
     inside = cell[a] == cell[b]
-    from wks_segment.core.coarse import _components
-
     assert _components(a[inside], b[inside], mesh.n_vertices)[1] == count
 
 
@@ -36,18 +34,54 @@ def test_sheets_that_lie_close_have_cells_of_their_own():
     assert not set(cell[: lower.n_vertices]) & set(cell[lower.n_vertices :])
 
 
-def test_prolongation_carries_constants_everywhere_and_slopes_on_a_plane():
+def level_of(mesh):
+    stiffness = csr_matrix(stiffness_matrix(mesh)).astype(np.float32)
+    masses = mesh.vertex_areas
+    return Level(mesh.vertices, edges_of(stiffness), masses, stiffness, csr_matrix(diags(masses.astype(np.float32))))
+
+
+@pytest.mark.parametrize("wide", [False, True])
+def test_prolongation_carries_constants_everywhere_and_slopes_inside_a_plane(wide):
     mesh = unit_area(grid(60, 60))
-    stiffness = csr_matrix(stiffness_matrix(mesh))
-    basis = prolongation(mesh, mesh.vertex_areas, stiffness, 150)
-    np.testing.assert_allclose(basis @ np.ones(basis.shape[1]), 1.0, atol=1e-9)
-    # The best fit of a slope from the coarse space, inside: the border's Jacobi step bends it.
-    slope = mesh.vertices[:, 0]
-    fit = basis @ np.linalg.lstsq(basis.toarray(), slope, rcond=None)[0]
-    assert np.abs(fit - slope).max() < 0.03
+    prolongation, cells = level_of(mesh).coarsened(150, wide)
+    np.testing.assert_allclose(prolongation @ np.ones(prolongation.shape[1]), 1.0, atol=1e-5)
+    inside = (np.abs(mesh.vertices[:, :2] - mesh.vertices[:, :2].mean(axis=0)) < 0.3).all(axis=1)
+    for axis in range(2):
+        carried = prolongation @ cells.positions[:, axis]
+        np.testing.assert_allclose(carried[inside], mesh.vertices[inside, axis], atol=2e-3)
+
+
+def test_prolongation_does_not_depend_on_the_orientation_of_faces():
+    mesh = unit_area(creature(0.4))
+    turned = mesh.faces.copy()
+    turned[::2] = turned[::2, ::-1]
+    one, other = (level_of(m).coarsened(300)[0] for m in (mesh, TriangleMesh(mesh.vertices, turned)))
+    np.testing.assert_allclose(one.toarray(), other.toarray(), atol=1e-5)
+
+
+def test_a_level_of_cells_has_the_area_and_nearly_the_energy_of_the_surface():
+    mesh = unit_area(creature(0.4, 5))
+    level = level_of(mesh)
+    prolongation, cells = level.coarsened(2000)
+    assert cells.areas.sum() == pytest.approx(1)
+    assert cells.mass.sum() == pytest.approx(1, rel=1e-5)
+    for axis in range(3):
+        here, there = mesh.vertices[:, axis], cells.positions[:, axis]
+        assert there @ cells.stiffness @ there == pytest.approx(here @ level.stiffness @ here, rel=0.03)
+        difference = prolongation @ there - here
+        assert difference @ level.stiffness @ difference < 0.03 * (here @ level.stiffness @ here)
+
+
+def test_coarse_eigenvalues_are_upper_bounds_and_near():
+    mesh = unit_area(icosphere(5))
+    _, cells = level_of(mesh).coarsened(400, wide=True)
+    values, vectors = coarse_eigenpairs(cells, 1, 24)
+    expected = 4 * np.pi * np.repeat([2, 6, 12, 20], [3, 5, 7, 9])
+    np.testing.assert_allclose(values, expected, rtol=0.02)
+    assert (values > 0.998 * expected).all()
+    np.testing.assert_allclose(vectors.T @ (cells.mass @ vectors), np.eye(24), atol=1e-4)
 
 
 def test_a_tiny_surface_still_works():
-    mesh = unit_area(icosphere(0))
-    basis = prolongation(mesh, mesh.vertex_areas, csr_matrix(stiffness_matrix(mesh)), 4)
-    np.testing.assert_allclose(basis @ np.ones(basis.shape[1]), 1.0, atol=1e-9)
+    prolongation, _ = level_of(unit_area(icosphere(0))).coarsened(4)
+    np.testing.assert_allclose(prolongation @ np.ones(prolongation.shape[1]), 1.0, atol=1e-5)

@@ -47,7 +47,5 @@ def test_a_singular_matrix_is_refused():
 def test_points_at_one_place_do_not_matter():
     mesh = icosphere(3)
     matrix = shifted(mesh, 100.0)
-    solution = NestedDissectionFactor(matrix, np.zeros((mesh.n_vertices, 3)), np.float64).solve(
-        np.eye(mesh.n_vertices)
-    )
+    solution = NestedDissectionFactor(matrix, np.zeros((mesh.n_vertices, 3)), np.float64).solve(np.eye(mesh.n_vertices))
     np.testing.assert_allclose(matrix @ solution, np.eye(mesh.n_vertices), atol=1e-9)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from shapes import creature, grid, icosphere, together
 
-from wks_segment.core import TriangleMesh, eigenpairs, mass_matrix, spectrum, stiffness_matrix
+from wks_segment.core import TriangleMesh, eigenpairs, hierarchy, lanczos, mass_matrix, spectrum, stiffness_matrix
 
 
 @pytest.mark.parametrize("accuracy", ["fast", "exact"])
@@ -45,7 +45,7 @@ def test_iterative_and_dense_solver_agree(monkeypatch):
     np.testing.assert_allclose(iterative, dense, rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize(("accuracy", "tolerance"), [("exact", 1e-8), ("fast", 2e-3)])
+@pytest.mark.parametrize(("accuracy", "tolerance"), [("exact", 1e-8), ("fast", 5e-3)])
 def test_equal_components_have_every_eigenvalue_as_often_as_there_are_of_them(monkeypatch, accuracy, tolerance):
     monkeypatch.setattr(spectrum, "DENSE_BELOW", 0)
     one = creature(0.2, 3)
@@ -87,17 +87,15 @@ def test_missed_pairs_are_found_again(monkeypatch):
     monkeypatch.setattr(spectrum, "DENSE_BELOW", 0)
     mesh = creature(0.3, 3)
     expected, _ = eigenpairs(mesh, 50, "exact")
-    real, calls = spectrum._block_lanczos, []
+    real, calls = lanczos._block_lanczos, []
 
-    def forgetful(factor, known, count):
+    def forgetful(factor, shift, known, start, count, tick):
         calls.append(count)
-        return (
-            np.delete(real(factor, known, count + 3), [3, 25, 26], axis=1)
-            if len(calls) == 1
-            else real(factor, known, count)
-        )
+        if len(calls) > 1:
+            return real(factor, shift, known, start, count, tick)
+        return np.delete(real(factor, shift, known, start, count + 3, tick), [3, 25, 26], axis=1)
 
-    monkeypatch.setattr(spectrum, "_block_lanczos", forgetful)
+    monkeypatch.setattr(lanczos, "_block_lanczos", forgetful)
     values, _ = eigenpairs(mesh, 50, "exact")
     assert calls == [50, 3]
     np.testing.assert_allclose(values, expected, rtol=1e-9, atol=1e-9)
@@ -105,16 +103,16 @@ def test_missed_pairs_are_found_again(monkeypatch):
 
 def test_inaccurate_pairs_are_refused(monkeypatch):
     monkeypatch.setattr(spectrum, "DENSE_BELOW", 0)
-    monkeypatch.setattr(spectrum, "TOLERANCE", 1e-20)
-    monkeypatch.setattr(spectrum, "ROUNDING", 0.0)
+    monkeypatch.setattr(lanczos, "TOLERANCE", 1e-20)
+    monkeypatch.setattr(lanczos, "ROUNDING", 0.0)
     with pytest.raises(spectrum.SpectrumError, match="not accurate enough: relative residual"):
         eigenpairs(creature(0.3, 3), 20, "exact")
 
 
 def test_fast_falls_back_to_exact_with_a_warning(monkeypatch):
     mesh = creature(0.3, 4)
-    monkeypatch.setattr(spectrum, "LARGEST_CHANGE", 0.0)
-    monkeypatch.setattr(spectrum, "LARGEST_CHANGE_OF_BOTH", 0.0)
+    monkeypatch.setattr(hierarchy, "LARGEST_CHANGE", 0.0)
+    monkeypatch.setattr(hierarchy, "LARGEST_CHANGE_LATER", 0.0)
     with pytest.warns(UserWarning, match="fast eigensolver did not converge"):
         values, _ = eigenpairs(mesh, 60, "fast")
     np.testing.assert_allclose(values, eigenpairs(mesh, 60, "exact")[0], rtol=1e-9, atol=1e-9)

@@ -21,16 +21,19 @@ LIGHTEST = 0.2
 """A cell of less than this many times the mean mass joins a neighbour, if it does not become too heavy."""
 SPLITS = 5
 """Rounds of splitting, each into half the size."""
-REACH, REACH_SMOOTHED = 2.0, 2.6
-"""Radius of a cell's function, in square roots of a cell's mean area. Wider ones are more accurate and overlap more."""
+REACH, REACH_SMOOTHED, REACH_WIDE = 2.0, 1.8, 2.6
+"""Radius of a cell's function, in square roots of a cell's mean area: plain, smoothed, and for a space that is solved
+densely. Wider functions are more accurate and overlap more."""
+MANY_VERTICES = 15
+"""Vertices in a cell from which on functions need no smoothing: they are smooth on the scale of the triangles."""
 DAMPING = np.float32(0.66)
 """Of a step of smoothing, in units of the inverse diagonal."""
 LEAST_WEIGHT = 1e-3
 """Weight of a vertex's own cell if even its middle is out of reach."""
 RIDGE = 1e-3
 """Decides what neighbours do not: across a flat surface, or where there are too few, a fit is constant."""
-ROWS = 50_000
-"""Vertices whose functions are fitted at once."""
+ROWS = 15_000
+"""Vertices whose functions are fitted at once: their moments stay in the cache."""
 
 
 def edges_of(matrix: csr_matrix) -> tuple[IntArray, IntArray]:
@@ -139,11 +142,23 @@ class Level:
     stiffness: csr_matrix
     mass: csr_matrix
 
-    def coarsened(self, n_cells: int, smoothed: bool = False) -> tuple[csr_matrix, Level]:
+    def zero_modes(self) -> FloatArray:
+        """(n, c) M-orthonormal constants in float32, one for each component."""
+        component, count = _components(*self.edges, len(self.areas))
+        modes = np.zeros((len(component), count), dtype=np.float32)
+        modes[np.arange(len(component)), component] = 1
+        return np.asarray(
+            modes / np.sqrt(np.einsum("ij,ij->j", modes, self.mass @ modes, dtype=np.float64)), np.float32
+        )
+
+    def coarsened(self, n_cells: int, wide: bool = False) -> tuple[csr_matrix, Level]:
         """Prolongation to this level from one of about `n_cells` cells, and that level (Galerkin's restriction).
 
-        The prolongation is an (n, number of cells) sparse matrix: from values at cells to smooth functions.
+        The prolongation is an (n, number of cells) sparse matrix: from values at cells to smooth functions. `wide` ones
+        suit a space that is solved densely.
         """
+        smoothed = wide or len(self.areas) < MANY_VERTICES * n_cells
+        reach = REACH_WIDE if wide else REACH_SMOOTHED if smoothed else REACH
         cell, count = cluster(self.positions, self.edges, self.areas, n_cells)
         middle = _middle_vertices(self.positions, self.areas, cell, count)
         adjacent = _adjacency(cell, count, self.edges)
@@ -154,7 +169,7 @@ class Level:
                 cell[start : start + ROWS],
                 self.positions[middle],
                 around,
-                (REACH_SMOOTHED if smoothed else REACH) / np.sqrt(n_cells),
+                reach / np.sqrt(n_cells),
             )
             for start in range(0, len(cell), ROWS)
         ]

@@ -82,8 +82,7 @@ class NestedDissectionFactor:
             self.n_negative += n_negative
             below = block[size:, :size]
             coupling = below @ inverse
-            if len(front.outside):
-                updates[id(front)] = block[size:, size:] - coupling @ below.T
+            updates[id(front)] = block[size:, size:] - coupling @ below.T
             self._factors.append((front, inverse, coupling))
 
     def solve(self, right: FloatArray) -> FloatArray:

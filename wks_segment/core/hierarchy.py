@@ -17,22 +17,27 @@ from .coarse import Level, coarse_eigenpairs
 from .factor import NestedDissectionFactor, SingularError
 from .mesh import FloatArray
 
-CELLS_PER_PAIR = 4.0
-"""Size of the coarse space, which is solved densely."""
-SPARE_PAIRS = 0.04
-"""Pairs carried along beyond those asked for, as a fraction of them: a correction may change their order."""
+CELLS_PER_PAIR, MORE_CELLS_PER_PAIR = 4.0, 5.0
+"""Size of the coarse space, which is solved densely. A second correction costs more than more cells from `MANY` on."""
+MANY = 40_000
+SPARE_PAIRS, LEAST_SPARE = 0.1, 8
+"""Pairs carried along beyond those asked for, as a fraction of them and as a number: a correction may change their
+order."""
 SHIFT = 0.5
 """Shift of the inverse for each pair asked for; a small shift would cost single precision its digits."""
-LARGEST_CHANGE = 0.075
+LARGEST_CHANGE, LARGEST_CHANGE_LATER = 0.07, 0.03
 """Relative change of a function up to which a correction was the last one: what is left is a small part of it, and the
-signature within 0.2 to 0.5 % of the exact one."""
+signature within 0.2 to 0.6 % of the exact one. The latter where an earlier correction was larger."""
+LEAST_DIRECTION = 1e-5
+"""Squared size of a direction among the changes, relative to the largest, below which it is rounding."""
 MAX_CORRECTIONS = 4
 """Corrections before the coarse space is refined."""
 LEAST_VALUE = 1e-6
 """A first value below this fraction of the last one is rounding, or needs more digits than there are."""
 
-LARGE = 150_000
-"""Vertices from which a level of cells comes between the coarse space and the surface."""
+LARGE = 180_000
+"""Vertices from which a level of cells comes between the coarse space and the surface, so many that its functions need
+a correction on the surface only seldom."""
 MIDDLE_CELLS_PER_PAIR = 80
 LARGEST_CHANGE_OF_LIFTED = 0.03
 """Functions of the cells that a correction on the surface would change by no more stay as they are."""
@@ -78,20 +83,22 @@ def hierarchical_eigenpairs(
     Raises
     ------
     NotConvergedError
-        Also by the iterator.
+        If it cannot be done this way; seldom, if a very large surface shows that late, by the iterator.
     """
     try:
         if len(level.areas) <= LARGE:
             values, vectors = _solve(level, _Correction(level, count), count, n_zero, tick)
-            return values, ((columns, vectors[:, columns]) for columns in panels(len(vectors), count))
-        prolongation, middle = level.coarsened(MIDDLE_CELLS_PER_PAIR * count)
+            return values, ((columns, vectors[:, columns]) for columns in panels(*vectors.shape))
+        prolongation, cells = level.coarsened(MIDDLE_CELLS_PER_PAIR * count)
         tick(0.3)
-        correction = _Correction(middle, count)
-        values, vectors = _solve(middle, correction, count, n_zero, lambda share: tick(0.3 + 0.2 * share))
-        change = _change_of_lifted(level, prolongation, correction, values, vectors)
-        final = _Correction(level, count) if change > LARGEST_CHANGE_OF_LIFTED else None
+        on_cells = _Correction(cells, count)
+        values, weights = _solve(cells, on_cells, count, n_zero, lambda share: tick(0.3 + 0.2 * share))
+        change = _change_ahead(level, prolongation, on_cells, values, weights)
+        if change > LARGEST_CHANGE:
+            raise NotConvergedError("the cells do not carry the functions of the surface")
+        correction = _Correction(level, count) if change > LARGEST_CHANGE_OF_LIFTED else None
         tick(0.6)
-        return values, _lifted(level, prolongation, values, vectors, final, tick)
+        return values, _lifted(prolongation, values, weights, correction, lambda share: tick(0.6 + 0.4 * share))
     except (SingularError, LinAlgError) as error:
         raise NotConvergedError(f"single precision does not suffice: {error}") from error
 
@@ -100,14 +107,14 @@ def _solve(
     level: Level, correction: _Correction, count: int, n_zero: int, tick: Callable[[float], None]
 ) -> tuple[FloatArray, FloatArray]:
     """Pairs from a coarse space, corrected on the level until corrections are small."""
-    n_cells = round(CELLS_PER_PAIR * count)
+    n_cells = round((MORE_CELLS_PER_PAIR if len(level.areas) > MANY else CELLS_PER_PAIR) * count)
     while 2 * n_cells < len(level.areas):
-        prolongation, cells = level.coarsened(n_cells, smoothed=True)
+        prolongation, cells = level.coarsened(n_cells, wide=True)
         tick(0.2)
-        values, weights = coarse_eigenpairs(cells, n_zero, round((1 + SPARE_PAIRS) * count))
+        values, weights = coarse_eigenpairs(cells, n_zero, round((1 + SPARE_PAIRS) * count) + LEAST_SPARE)
         vectors = times(prolongation, weights)
         tick(0.5)
-        for _ in range(MAX_CORRECTIONS):
+        for step in range(MAX_CORRECTIONS):
             change = 0.0
             for columns in panels(len(vectors), len(values)):
                 panel = np.ascontiguousarray(vectors[:, columns])
@@ -115,8 +122,8 @@ def _solve(
                 vectors[:, columns] = panel
                 change = max(change, float(changes[: count - columns.start].max(initial=0.0)))
                 tick(0.5 + 0.4 * columns.stop / len(values))
-            if change > LARGEST_CHANGE:
-                values, vectors = _rayleigh_ritz(level, vectors)
+            if change > (LARGEST_CHANGE_LATER if step else LARGEST_CHANGE):
+                values, vectors = _enlarged(correction, vectors)
                 continue
             # The residual of a Ritz vector is orthogonal to all others, and so nearly is its correction.
             order = np.argsort(values, kind="stable")[:count]
@@ -140,12 +147,7 @@ class _Correction:
 
     def __call__(self, values: FloatArray, vectors: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Correct a panel of vectors in place. Returns their Rayleigh quotients and their relative changes."""
-        weighted = times(self.level.mass, vectors)
-        residual = times(self.level.stiffness, vectors)
-        of_values = values.astype(np.float32)
-        for rows in _chunks(vectors):
-            residual[rows] -= weighted[rows] * of_values
-        change = self.factor.solve(residual)
+        change, residual, weighted = self.change(values, vectors)
         # x is a vector, e its change, r its residual S x − λ M x. (S + shift M) e = r spares the product S e.
         xx, xe = _dots(vectors, weighted), _dots(change, weighted)
         xr, er = _dots(vectors, residual), _dots(change, residual)
@@ -166,41 +168,71 @@ class _Correction:
             vectors[rows] -= change[rows] * of_step
         return energies / squares, np.sqrt(ee / xx)
 
+    def change(self, values: FloatArray, vectors: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(S + shift M)⁻¹ r, the residual r = S x − λ M x, and M x."""
+        weighted = times(self.level.mass, vectors)
+        residual = times(self.level.stiffness, vectors)
+        of_values = values.astype(np.float32)
+        for rows in _chunks(vectors):
+            residual[rows] -= weighted[rows] * of_values
+        return self.factor.solve(residual), residual, weighted
 
-def _rayleigh_ritz(level: Level, vectors: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Best eigenpairs within the span of some vectors."""
-    energy = (vectors.T @ times(level.stiffness, vectors)).astype(np.float64)
-    gram = (vectors.T @ times(level.mass, vectors)).astype(np.float64)
-    values, rotation = eigh((energy + energy.T) / 2, gram)
-    return values, vectors @ rotation.astype(np.float32)
+
+def _enlarged(correction: _Correction, vectors: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """As many eigenpairs, the best within the span of vectors and their changes together (Rayleigh and Ritz).
+
+    Finds functions that the coarse space hardly held, as those of thin parts.
+    """
+    level = correction.level
+    zero_modes = level.zero_modes()
+    values, vectors = _rayleigh_ritz(level, _without(zero_modes, level, vectors), vectors.shape[1])
+    changes = np.empty_like(vectors)
+    for columns in panels(len(vectors), len(values)):
+        changes[:, columns] = correction.change(values[columns], np.ascontiguousarray(vectors[:, columns]))[0]
+    changes = _without(vectors, level, _without(zero_modes, level, changes))
+    squares, directions = np.linalg.eigh((changes.T @ times(level.mass, changes)).astype(np.float64))
+    kept = squares > LEAST_DIRECTION * squares[-1]
+    changes = changes @ (directions[:, kept] / np.sqrt(squares[kept])).astype(np.float32)
+    return _rayleigh_ritz(level, np.hstack([vectors, changes]), vectors.shape[1])
+
+
+def _rayleigh_ritz(level: Level, basis: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
+    """The lowest eigenpairs within the span of a basis."""
+    energy = (basis.T @ times(level.stiffness, basis)).astype(np.float64)
+    gram = (basis.T @ times(level.mass, basis)).astype(np.float64)
+    values, rotation = eigh((energy + energy.T) / 2, gram, subset_by_index=[0, count - 1])
+    return values, basis @ rotation.astype(np.float32)
+
+
+def _without(known: FloatArray, level: Level, vectors: FloatArray) -> FloatArray:
+    """Vectors less their part in the span of known, M-orthonormal ones."""
+    return np.asarray(vectors - known @ (times(level.mass, known).T @ vectors))
 
 
 def _lifted(
-    level: Level,
     prolongation: csr_matrix,
     values: FloatArray,
     weights: FloatArray,
     correction: _Correction | None,
     tick: Callable[[float], None],
 ) -> Iterator[tuple[slice, FloatArray]]:
-    """Panels of functions from their values at cells, corrected on the surface where a correction is given."""
-    for columns in panels(len(level.areas), len(values)):
+    """Panels of functions from their values at cells, corrected on the surface where a correction is given.
+
+    What is M-normalised on the cells is so on the surface: Galerkin's mass matrix is that of the lifted functions. A
+    correction brings their values up to date in place.
+    """
+    for columns in panels(prolongation.shape[0], len(values)):
         vectors = prolongation @ np.ascontiguousarray(weights[:, columns])
         if correction:
-            current = values[columns]
-            for _ in range(MAX_CORRECTIONS):
-                current, changes = correction(current, vectors)
-                if changes.max() <= LARGEST_CHANGE:
-                    break
-            else:
+            values[columns], changes = correction(values[columns], vectors)
+            # No second one: each also makes more of whatever lower functions are in there, which are not at hand.
+            if changes.max() > LARGEST_CHANGE:
                 raise NotConvergedError("corrections stay large")
-        else:
-            vectors /= np.sqrt(_dots(vectors, level.mass @ vectors)).astype(np.float32)
         yield columns, vectors
-        tick(0.6 + 0.4 * columns.stop / len(values))
+        tick(columns.stop / len(values))
 
 
-def _change_of_lifted(
+def _change_ahead(
     level: Level, prolongation: csr_matrix, on_cells: _Correction, values: FloatArray, weights: FloatArray
 ) -> float:
     """Relative change that a correction on the surface would bring, estimated for a few functions without a factor.

@@ -27,6 +27,10 @@ BLOCK = 16
 """Columns in a block."""
 SHIFT_WITHIN = 0.65
 """Place of the shift, as a fraction of the last value that is asked for."""
+NEARBY_SHIFTS = (1.0, 0.97, 1.03, 0.94)
+"""Multiples of the shift that are tried until a solve is accurate."""
+SOLVE_TOLERANCE = 1e-11
+"""Relative residual of a solve that is accurate."""
 CELLS_PER_PAIR = 2.0
 """Size of the coarse space that tells the last value beforehand, and the functions that Lanczos starts from."""
 FIRST_LOOK, LOOK_AGAIN = 1.7, 1.06
@@ -66,15 +70,7 @@ def lanczos_eigenpairs(
     highest, start = _forecast(level, zero_modes, count)
     tick(0.05)
 
-    def factorised(shift: float) -> NestedDissectionFactor:
-        shifted = csr_matrix(operator - shift * identity(operator.shape[0], format="csr"))
-        try:
-            return NestedDissectionFactor(shifted, level.positions, np.float64)
-        except SingularError as error:
-            raise SpectrumError(f"the operator cannot be factorised, its triangles are too thin: {error}") from error
-
-    shift = SHIFT_WITHIN * highest
-    factor = factorised(shift)
+    shift, factor = _stable_factor(operator, level, SHIFT_WITHIN * highest, start)
     # One pair more, so that the inertia count has a gap to stand in behind the last pair that is handed out.
     vectors = _block_lanczos(factor, shift, zero_modes, start, count + 1, lambda share: tick(0.1 + 0.7 * share))
     values, vectors = _rayleigh_ritz(operator, vectors, zero_modes)
@@ -86,7 +82,7 @@ def lanczos_eigenpairs(
     tick(0.9)
     for _ in range(MAX_REPAIRS):
         place = _widest_gap(values, count)
-        below = factorised((values[place - 1] + values[place]) / 2).n_negative
+        below = _factor(operator, level, (values[place - 1] + values[place]) / 2).n_negative
         missed = below - place - zero_modes.shape[1]
         if missed <= 0:
             break
@@ -100,12 +96,42 @@ def lanczos_eigenpairs(
     return values, vectors
 
 
+def _factor(operator: csr_matrix, level: Level, shift: float) -> NestedDissectionFactor:
+    """Of A − shift."""
+    shifted = csr_matrix(operator - shift * identity(operator.shape[0], format="csr"))
+    try:
+        return NestedDissectionFactor(shifted, level.positions, np.float64)
+    except SingularError as error:
+        raise SpectrumError(f"the operator cannot be factorised, its triangles are too thin: {error}") from error
+
+
+def _stable_factor(
+    operator: csr_matrix, level: Level, shift: float, right: FloatArray
+) -> tuple[float, NestedDissectionFactor]:
+    """A shift near the one given that is no eigenvalue of a part of the surface, and the factor there.
+
+    At one, a front is nearly singular, and the solution loses digits.
+    """
+    best: tuple[float, float, NestedDissectionFactor] | None = None
+    for nearby in NEARBY_SHIFTS:
+        factor = _factor(operator, level, nearby * shift)
+        solution = factor.solve(right)
+        left = operator @ solution - nearby * shift * solution - right
+        error = float(np.linalg.norm(left) / np.linalg.norm(right))
+        if best is None or error < best[0]:
+            best = error, nearby * shift, factor
+        if error <= SOLVE_TOLERANCE:
+            break
+    assert best is not None
+    return best[1:]
+
+
 def _forecast(level: Level, zero_modes: FloatArray, count: int) -> tuple[float, FloatArray]:
     """The last value asked for, roughly, and a block in which all functions up to there take part."""
     generator = np.random.default_rng(0)
     start = generator.standard_normal((len(zero_modes), BLOCK))
     try:
-        prolongation, cells = level.coarsened(round(CELLS_PER_PAIR * count), smoothed=True)
+        prolongation, cells = level.coarsened(round(CELLS_PER_PAIR * count), wide=True)
         values, weights = coarse_eigenpairs(cells, zero_modes.shape[1], count)
     except LinAlgError:
         values = np.zeros(0)
@@ -184,6 +210,7 @@ def _orthonormal_to(basis: FloatArray, block: FloatArray) -> FloatArray:
 def _rayleigh_ritz(operator: csr_matrix, basis: FloatArray, known: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Best eigenpairs of A within the span of a basis, orthogonal to the `known` vectors."""
     basis = basis - known @ (known.T @ basis)
+    basis /= np.linalg.norm(basis, axis=0)  # inverse iteration has stretched what is near to the shift
     values, rotation = eigh(basis.T @ (operator @ basis), basis.T @ basis)
     return values, basis @ rotation
 
