@@ -30,7 +30,11 @@ def body(n_vertices: int, bend: float = 0.3, irregular: bool = False) -> Triangl
         radius = np.sqrt(1 - height**2)
         points = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)
     points /= np.linalg.norm(points, axis=1)[:, None]
-    return TriangleMesh(_posed(_with_limbs(points), bend), ConvexHull(points).simplices)
+    faces = ConvexHull(points).simplices
+    a, b, c = (points[faces[:, i]] for i in range(3))
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0
+    faces[inward] = faces[inward, ::-1]
+    return TriangleMesh(_posed(_with_limbs(points), bend), faces)
 
 
 def with_border(mesh: TriangleMesh) -> TriangleMesh:

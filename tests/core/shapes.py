@@ -60,6 +60,16 @@ def creature(bend=0.0, subdivisions=4, seed=None):
     return TriangleMesh(posed, faces)
 
 
+def shaken(mesh, amount=0.35, seed=0):
+    """The same surface with vertices moved along their edges: irregular triangles, thin ones among them."""
+    generator = np.random.default_rng(seed)
+    edge = mesh.faces[:, [0, 1]]
+    target = np.arange(mesh.n_vertices)
+    target[edge[:, 0]] = edge[:, 1]
+    share = amount * generator.random((mesh.n_vertices, 1))
+    return TriangleMesh((1 - share) * mesh.vertices + share * mesh.vertices[target], mesh.faces)
+
+
 def split_at_every_corner(mesh):
     """The same surface as a triangle soup: each corner has a vertex of its own."""
     return TriangleMesh(mesh.vertices[mesh.faces].reshape(-1, 3), np.arange(3 * mesh.n_faces).reshape(-1, 3))

@@ -10,6 +10,7 @@ import pytest
 PACKAGE = Path(__file__).resolve().parents[2] / "wks_segment"
 BLENDERS_OWN = {"bpy", "bmesh", "mathutils", "bpy_extras", "gpu", "blf", "aud"}
 CHAIN = [
+    "memory",
     "mesh",
     "surface",
     "laplacian",

@@ -171,3 +171,38 @@ def test_an_unfitted_model_says_so(tmp_path):
 def test_something_else_than_a_mesh_is_named(model):
     with pytest.raises(TypeError, match="must be a TriangleMesh or a PoseSignature, not list"):
         model.predict([1, 2, 3])
+
+
+def test_poses_described_side_by_side_are_those_described_one_by_one():
+    model = PoseSegmentation(**SMALL)
+    stages = []
+    together_ = model.describe_all(POSES, progress=lambda stage, share: stages.append((stage, share)), workers=2)
+    for pose, described in zip(POSES, together_, strict=True):
+        np.testing.assert_allclose(described.signature, model.describe(pose).signature, rtol=1e-4)
+    shares = [share for _, share in stages]
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    assert stages[0][0] == "pose 1 of 3"
+
+
+def test_an_error_from_progress_ends_all_poses():
+    class Stop(Exception):  # noqa: N818
+        pass
+
+    def stop(stage, share):
+        if share > 0:
+            raise Stop
+
+    with pytest.raises(Stop):
+        PoseSegmentation(**SMALL).describe_all(POSES, progress=stop, workers=2)
+
+
+def test_a_pose_that_cannot_be_described_is_named():
+    bad = TriangleMesh([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1e-9)], [(0, 1, 2), (0, 2, 3)])
+    model = PoseSegmentation(n_energies=1)
+    with pytest.raises(ValueError, match="n_energies"):
+        model.describe_all([bad])
+    with pytest.raises(ValueError, match=r'"Bad": .*collapses'):
+        PoseSegmentation(**SMALL).describe_all(
+            [POSES[0], bad], [None, np.zeros(4, dtype=int)], names=['"Good"', '"Bad"']
+        )

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
-from shapes import creature, grid, icosphere, together
+from shapes import creature, grid, icosphere, shaken, together
 
 from wks_segment.core import TriangleMesh, eigenpairs, hierarchy, lanczos, mass_matrix, spectrum, stiffness_matrix
+from wks_segment.core.memory import available_memory
 
 
 @pytest.mark.parametrize("accuracy", ["fast", "exact"])
@@ -121,8 +122,7 @@ def test_fast_falls_back_to_exact_with_a_warning(monkeypatch):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"n_pairs": 0}, "n_pairs must be from 1"),
-        ({"n_pairs": 10_000}, "n_pairs must be from 1 to the number of vertices"),
+        ({"n_pairs": 0}, "n_pairs must be at least 1"),
         ({"accuracy": "rough"}, "accuracy must be one of"),
     ],
 )
@@ -135,3 +135,76 @@ def test_a_vertex_without_a_face_is_named():
     mesh = grid(3, 3)
     with pytest.raises(ValueError, match="vertex 16 belongs to no face"):
         eigenpairs(TriangleMesh(np.concatenate([mesh.vertices, [(5, 5, 5)]]), mesh.faces), 5)
+
+
+def test_more_pairs_than_vertices_are_as_many_as_there_are_and_it_says_so():
+    with pytest.warns(UserWarning, match="only 12 vertices"):
+        values, functions = eigenpairs(icosphere(0), 300)
+    assert values.shape == (12,)
+    assert functions.shape == (12, 12)
+
+
+def test_memory_that_does_not_suffice_is_said_before(monkeypatch):
+    monkeypatch.setattr(spectrum, "available_memory", lambda: 10_000_000)
+    with pytest.raises(MemoryError, match=r"60 eigenpairs of 10,242 vertices need about 32 MB .* 10 MB are free"):
+        eigenpairs(icosphere(5), 60)
+
+
+IRREGULAR = {
+    "limbs": creature(0.4, 5),
+    "irregular": shaken(creature(0.4, 5)),
+    "parts": together(creature(0.2, 4), grid(60, 40)),
+}
+
+
+@pytest.mark.parametrize("name", IRREGULAR)
+@pytest.mark.parametrize("path", ["one level", "cells between", "cells between, corrected"])
+def test_fast_pairs_agree_with_exact_ones(monkeypatch, name, path):
+    mesh = IRREGULAR[name]
+    if path != "one level":
+        monkeypatch.setattr(hierarchy, "LARGE", 0)
+        monkeypatch.setattr(hierarchy, "MIDDLE_CELLS_PER_PAIR", 30)
+    if path == "cells between, corrected":
+        monkeypatch.setattr(hierarchy, "LARGEST_CHANGE_OF_LIFTED", 0.0)
+    expected, functions = eigenpairs(mesh, 80, "exact")
+    values, approximate = eigenpairs(mesh, 80, "fast")
+    np.testing.assert_allclose(values, expected, rtol=0.03 if path == "cells between" else 0.012, atol=1e-8)
+    mass = mass_matrix(mesh) / mesh.area
+    covered = np.linalg.norm(functions.T @ mass @ approximate, axis=0)
+    # All but the last ones, which may be mixed with those behind them.
+    np.testing.assert_allclose(covered[:70], 1, atol=0.02)
+
+
+@pytest.mark.parametrize("accuracy", ["fast", "exact"])
+def test_progress_rises_and_an_error_from_it_ends_the_solve(accuracy):
+    shares = []
+    eigenpairs(creature(0.3, 4), 60, accuracy, shares.append)
+    assert len(shares) >= 3
+    assert shares == sorted(shares)
+    assert 0 <= shares[0] <= shares[-1] <= 1
+
+    class Stop(Exception):  # noqa: N818
+        pass
+
+    def stop(share):
+        if share > 0.15:
+            raise Stop
+
+    with pytest.raises(Stop):
+        eigenpairs(creature(0.3, 4), 60, accuracy, stop)
+
+
+@pytest.mark.parametrize("accuracy", ["fast", "exact"])
+def test_the_order_of_the_vertices_does_not_matter(accuracy):
+    mesh = creature(0.3, 4)
+    order = np.random.default_rng(0).permutation(mesh.n_vertices)
+    place = np.argsort(order)
+    values, functions = eigenpairs(mesh, 60, accuracy)
+    again, elsewhere = eigenpairs(TriangleMesh(mesh.vertices[order], place[mesh.faces]), 60, accuracy)
+    np.testing.assert_allclose(again, values, rtol=1e-3, atol=1e-8)
+    np.testing.assert_allclose((elsewhere**2).sum(axis=1), (functions**2)[order].sum(axis=1), rtol=0.05)
+
+
+def test_the_memory_that_is_free_is_some_and_not_all_there_could_be():
+    free = available_memory()
+    assert free is None or 2**20 < free < 2**50

@@ -139,21 +139,28 @@ def describe(
     model: PoseSegmentation, poses: Sequence[Pose], report: Report, progress: Progress, share: float = 1.0
 ) -> list[PoseSignature]:
     """Signature of each pose; poses that are one and the same surface are computed once."""
-    described: list[PoseSignature] = []
-    # One surface in all poses of a mesh, also where pieces of it meet in some.
-    welded: dict[int, IntArray] = {}
-    for i, pose in enumerate(poses):
-        first = next(j for j, other in enumerate(poses) if pose.is_mesh_of(other))
-        if first == i:
-            welded[i] = weld(*(other.mesh for other in poses if pose.is_mesh_of(other)))
-        progress(f"Signature of {pose.name} ({i + 1} of {len(poses)})", share * i / len(poses))
-        twin = next((j for j in range(i) if pose.is_like(poses[j])), None)
-        with report.stage("signature"):
-            try:
-                described.append(model.describe(pose.mesh, welded[first]) if twin is None else described[twin])
-            except (ValueError, SpectrumError) as error:
-                raise UserError(f'"{pose.name}": {error}') from error
-    return described
+    same = [next((j for j in range(i) if pose.is_like(poses[j])), i) for i, pose in enumerate(poses)]
+    new = [i for i, first in enumerate(same) if first == i]
+    with report.stage("weld"):
+        # One surface in all poses of a mesh, also where pieces of it meet in some.
+        welded: dict[int, IntArray] = {}
+        for i, pose in enumerate(poses):
+            first = next(j for j, other in enumerate(poses) if pose.is_mesh_of(other))
+            if first == i:
+                welded[i] = weld(*(other.mesh for other in poses if pose.is_mesh_of(other)))
+            welded[i] = welded[first]
+    with report.stage("signature"):
+        try:
+            described = model.describe_all(
+                [poses[i].mesh for i in new],
+                [welded[i] for i in new],
+                lambda stage, done: progress(f"Signature of {stage}", share * done),
+                [f'"{poses[i].name}"' for i in new],
+            )
+        except (ValueError, SpectrumError, MemoryError) as error:
+            raise UserError(str(error)) from error
+    of = dict(zip(new, described, strict=True))
+    return [of[first] for first in same]
 
 
 def label(

@@ -6,29 +6,40 @@ descriptor" (2011).
 
 from __future__ import annotations
 
+import os
+import threading
 from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from os import PathLike
 from typing import Literal, get_args
 
 import numpy as np
 from scipy.sparse import diags
+from threadpoolctl import threadpool_limits
 
 from . import model_file
 from .laplacian import unit_area_masses
+from .memory import available_memory
 from .mesh import FloatArray, IntArray, TriangleMesh
 from .mixture import CovarianceType, GaussianMixture, fit_mixture
 from .regions import FaceAdjacency, connected_regions, merge_crumbs, smooth_posteriors
 from .signature import wave_kernel_signature_of
-from .spectrum import Accuracy
+from .spectrum import Accuracy, SpectrumError, memory_needed
 from .surface import Surface, indicator, prepare_surface
 
 Scaling = Literal["log", "raw"]
 Progress = Callable[[str, float], None]
-"""Called with the stage and the fraction of the whole that is done, 0 to 1."""
+"""Called with the stage and the fraction of the whole that is done, 0 to 1. An error that it raises ends the work."""
 
 VERTICES_PER_PAIR = 10
 """A surface is refined until it has this many vertices for each eigenpair: about five to the shortest wavelength."""
+MAX_WORKERS = 4
+"""Poses solved side by side at most: they share the memory's speed."""
+PROGRESS_SECONDS = 0.1
+"""Time between two reports of progress."""
+MOST = 0.9
+"""Share of the work that is not the mixture."""
 SIGNATURE_OFFSET = 0.01
 """Added to the signature, whose mean is 1, before its logarithm: tiny loose parts take no part in low energies."""
 MAX_SAMPLES = 20_000
@@ -105,7 +116,12 @@ class PoseSegmentation:
         self.random_state = random_state
         self.scaling = scaling
 
-    def describe(self, mesh: TriangleMesh, welded: IntArray | None = None) -> PoseSignature:
+    def describe(
+        self,
+        mesh: TriangleMesh,
+        welded: IntArray | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> PoseSignature:
         """Compute the signature of one pose, to pass it to the other methods in the place of the mesh.
 
         Parameters
@@ -114,6 +130,8 @@ class PoseSegmentation:
             The pose.
         welded : (n,) int array, optional
             `weld(*poses)` of all poses of the same mesh: pieces that meet in some poses only stay apart in all.
+        progress : callable, optional
+            Called with the share of the work that is done, 0 to 1. An error that it raises ends the work.
 
         Raises
         ------
@@ -121,12 +139,94 @@ class PoseSegmentation:
             If a parameter of the model is out of range or the mesh has no usable face.
         SpectrumError
             If the eigenpairs could not be computed.
+        MemoryError
+            If they would need more memory than is free; the message says how much.
         """
         self._check_parameters()
         surface = prepare_surface(mesh, VERTICES_PER_PAIR * self.n_eigenpairs, welded)
         n_pairs = self.n_eigenpairs + surface.n_components - 1
-        signature = wave_kernel_signature_of(surface.mesh, n_pairs, self.n_energies, self.accuracy)
+        signature = wave_kernel_signature_of(surface.mesh, n_pairs, self.n_energies, self.accuracy, progress)
         return PoseSignature(surface, signature, self.n_eigenpairs)
+
+    def describe_all(
+        self,
+        meshes: Sequence[TriangleMesh],
+        welded: Sequence[IntArray | None] | None = None,
+        progress: Progress | None = None,
+        names: Sequence[str] | None = None,
+        workers: int | None = None,
+    ) -> list[PoseSignature]:
+        """`describe` several poses, side by side where there are cores and memory for it.
+
+        Parameters
+        ----------
+        meshes
+            The poses.
+        welded : one array or None a pose, optional
+            See `describe`.
+        progress
+            Called from the thread that called this.
+        names : optional
+            What to call each pose in messages; "pose 1" and so on if not given.
+        workers : int, optional
+            How many poses at once; as many as there are cores and memory for if not given, at most four.
+
+        Raises
+        ------
+        ValueError, SpectrumError, MemoryError
+            As `describe`; the message begins with the pose's name.
+        """
+        each = list(welded) if welded is not None else [None] * len(meshes)
+        called = list(names) if names is not None else [f"pose {i + 1}" for i in range(len(meshes))]
+        done = [0.0] * len(meshes)
+        ended = threading.Event()
+
+        def solve(i: int) -> PoseSignature:
+            def tick(share: float) -> None:
+                done[i] = share
+                if ended.is_set():
+                    raise CancelledError
+
+            try:
+                return self.describe(meshes[i], each[i], tick)
+            except (ValueError, SpectrumError, MemoryError) as error:
+                raise type(error)(f"{called[i]}: {error}") from error
+            finally:
+                done[i] = 1.0
+
+        def report() -> None:
+            if progress:
+                current = next((i for i, share in enumerate(done) if share < 1), len(done) - 1)
+                place = f"{current + 1} of {len(done)}"
+                progress(f"pose {place}" if names is None else f"{called[current]} ({place})", sum(done) / len(done))
+
+        if not len(meshes):
+            return []
+        # One BLAS thread a pose: narrow blocks gain nothing from more.
+        with threadpool_limits(1, "blas"), ThreadPoolExecutor(workers or self._workers(meshes)) as pool:
+            futures = [pool.submit(solve, i) for i in range(len(meshes))]
+            try:
+                waiting = set(futures)
+                while waiting:
+                    report()
+                    finished, waiting = wait(waiting, PROGRESS_SECONDS, FIRST_COMPLETED)
+                    for future in finished:
+                        future.result()
+            except BaseException:
+                ended.set()
+                for future in futures:
+                    future.cancel()
+                raise
+        report()
+        return [future.result() for future in futures]
+
+    def _workers(self, meshes: Sequence[TriangleMesh]) -> int:
+        """Poses for which there are cores and memory at once."""
+        largest = max((mesh.n_vertices for mesh in meshes), default=0)
+        needed = memory_needed(max(largest, VERTICES_PER_PAIR * self.n_eigenpairs), self.n_eigenpairs, self.accuracy)
+        free = available_memory()
+        by_memory = MAX_WORKERS if free is None else free // needed
+        return max(1, min(MAX_WORKERS, len(meshes), os.cpu_count() or 1, by_memory))
 
     def fit(self, meshes: Sequence[TriangleMesh | PoseSignature], progress: Progress | None = None) -> PoseSegmentation:
         """Learn the parts from one or more poses together.
@@ -137,7 +237,7 @@ class PoseSegmentation:
             The poses; they need not share their meshing. Each counts the same, whatever its size and number of
             vertices. One pose alone is allowed, but says nothing of what a pose changes.
         progress
-            Called before each pose and before the mixture is fitted.
+            Called while the poses are described and before the mixture is fitted.
 
         Raises
         ------
@@ -149,13 +249,12 @@ class PoseSegmentation:
         self._check_parameters()
         if not len(meshes):
             raise ValueError("there is no pose to learn from: pass one mesh at least, better three to five")
-        poses = []
-        for i, mesh in enumerate(meshes):
-            if progress:
-                progress(f"pose {i + 1} of {len(meshes)}", i / (len(meshes) + 1))
-            poses.append(self._described(mesh))
-        if progress:
-            progress("mixture", len(meshes) / (len(meshes) + 1))
+        tick = progress or (lambda stage, share: None)
+        new = {i: mesh for i, mesh in enumerate(meshes) if isinstance(mesh, TriangleMesh)}
+        found = self.describe_all(list(new.values()), None, lambda stage, share: tick(stage, MOST * share))
+        described = dict(zip(new, found, strict=True))
+        poses = [described.get(i) or self._described(mesh) for i, mesh in enumerate(meshes)]
+        tick("mixture", MOST)
         samples = np.concatenate([self._scaled(pose.signature) for pose in poses])
         weights = np.concatenate([unit_area_masses(pose.surface.mesh) for pose in poses])
         if self.n_segments > len(samples):
@@ -173,8 +272,7 @@ class PoseSegmentation:
             "shared" if self.covariance_type == "auto" else self.covariance_type,
             self.random_state,
         )
-        if progress:
-            progress("done", 1.0)
+        tick("done", 1.0)
         return self
 
     def predict(self, mesh: TriangleMesh | PoseSignature) -> IntArray:
