@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from scipy.sparse import csr_matrix, diags
+from scipy.sparse import csr_matrix
 from shapes import creature, grid, icosphere, together
 
 from wks_segment.core import TriangleMesh, stiffness_matrix
@@ -34,16 +34,10 @@ def test_sheets_that_lie_close_have_cells_of_their_own():
     assert not set(cell[: lower.n_vertices]) & set(cell[lower.n_vertices :])
 
 
-def level_of(mesh):
-    stiffness = csr_matrix(stiffness_matrix(mesh)).astype(np.float32)
-    masses = mesh.vertex_areas
-    return Level(mesh.vertices, edges_of(stiffness), masses, stiffness, csr_matrix(diags(masses.astype(np.float32))))
-
-
 @pytest.mark.parametrize("wide", [False, True])
 def test_prolongation_carries_constants_everywhere_and_slopes_inside_a_plane(wide):
     mesh = unit_area(grid(60, 60))
-    prolongation, cells = level_of(mesh).coarsened(150, wide)
+    prolongation, cells = Level.of(mesh).coarsened(150, wide)
     np.testing.assert_allclose(prolongation @ np.ones(prolongation.shape[1]), 1.0, atol=1e-5)
     inside = (np.abs(mesh.vertices[:, :2] - mesh.vertices[:, :2].mean(axis=0)) < 0.3).all(axis=1)
     for axis in range(2):
@@ -55,13 +49,13 @@ def test_prolongation_does_not_depend_on_the_orientation_of_faces():
     mesh = unit_area(creature(0.4))
     turned = mesh.faces.copy()
     turned[::2] = turned[::2, ::-1]
-    one, other = (level_of(m).coarsened(300)[0] for m in (mesh, TriangleMesh(mesh.vertices, turned)))
+    one, other = (Level.of(m).coarsened(300)[0] for m in (mesh, TriangleMesh(mesh.vertices, turned)))
     np.testing.assert_allclose(one.toarray(), other.toarray(), atol=1e-5)
 
 
 def test_a_level_of_cells_has_the_area_and_nearly_the_energy_of_the_surface():
     mesh = unit_area(creature(0.4, 5))
-    level = level_of(mesh)
+    level = Level.of(mesh)
     prolongation, cells = level.coarsened(2000)
     assert cells.areas.sum() == pytest.approx(1)
     assert cells.mass.sum() == pytest.approx(1, rel=1e-5)
@@ -74,7 +68,7 @@ def test_a_level_of_cells_has_the_area_and_nearly_the_energy_of_the_surface():
 
 def test_coarse_eigenvalues_are_upper_bounds_and_near():
     mesh = unit_area(icosphere(5))
-    _, cells = level_of(mesh).coarsened(400, wide=True)
+    _, cells = Level.of(mesh).coarsened(400, wide=True)
     values, vectors = coarse_eigenpairs(cells, 1, 24)
     expected = 4 * np.pi * np.repeat([2, 6, 12, 20], [3, 5, 7, 9])
     np.testing.assert_allclose(values, expected, rtol=0.02)
@@ -83,5 +77,5 @@ def test_coarse_eigenvalues_are_upper_bounds_and_near():
 
 
 def test_a_tiny_surface_still_works():
-    prolongation, _ = level_of(unit_area(icosphere(0))).coarsened(4)
+    prolongation, _ = Level.of(unit_area(icosphere(0))).coarsened(4)
     np.testing.assert_allclose(prolongation @ np.ones(prolongation.shape[1]), 1.0, atol=1e-5)

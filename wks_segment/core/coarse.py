@@ -13,7 +13,8 @@ from scipy.linalg import cholesky, eigh, solve_triangular
 from scipy.sparse import coo_matrix, csr_matrix, diags, identity, vstack
 from scipy.sparse.csgraph import connected_components
 
-from .mesh import FloatArray, IntArray
+from .laplacian import stiffness_matrix, unit_area_masses
+from .mesh import FloatArray, IntArray, TriangleMesh
 
 HEAVIEST = 1.5
 """A cell of more than this many times the mean mass is split: on a thin limb, a cube of space holds a whole tube."""
@@ -141,6 +142,14 @@ class Level:
     areas: FloatArray
     stiffness: csr_matrix
     mass: csr_matrix
+
+    @classmethod
+    def of(cls, mesh: TriangleMesh) -> Level:
+        """The finest level, of a mesh of area 1."""
+        stiffness = csr_matrix(stiffness_matrix(mesh)).astype(np.float32)
+        stiffness.sort_indices()
+        masses = unit_area_masses(mesh)
+        return cls(mesh.vertices, edges_of(stiffness), masses, stiffness, csr_matrix(diags(masses.astype(np.float32))))
 
     def zero_modes(self) -> FloatArray:
         """(n, c) M-orthonormal constants in float32, one for each component."""

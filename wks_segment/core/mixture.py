@@ -58,7 +58,7 @@ class GaussianMixture:
     def log_densities(self, samples: FloatArray) -> FloatArray:
         """(n, K) log of weight times density of each component at (n, d) samples."""
         blocks = [
-            _log_gaussians(samples[start : start + ROWS], self.means, self.covariances, self.covariance_type)
+            _log_gaussians(samples[start : start + ROWS], None, self.means, self.covariances, self.covariance_type)
             for start in range(0, max(len(samples), 1), ROWS)
         ]
         return np.concatenate(blocks) + np.log(self.weights)
@@ -133,12 +133,18 @@ def _maximise_likelihood(
 ) -> tuple[GaussianMixture, float]:
     """EM from (n, K) responsibilities; the mixture and its mean log-likelihood."""
     responsibilities, previous = start, -np.inf
+    # What both steps need of the samples if covariances are diagonal, once: they come standardised, so that sums of
+    # squares lose no digits.
+    squares = None if covariance_type in ("full", "tied") else samples**2
     for _ in range(MAX_ITERATIONS):
-        mixture = _maximise(samples, responsibilities * shares[:, None], covariance_type, floor)
-        logs = mixture.log_densities(samples)
-        likelihoods = logsumexp(logs, axis=1)
-        responsibilities = np.exp(logs - likelihoods[:, None])
-        current = float(shares @ likelihoods)
+        mixture = _maximise(samples, squares, responsibilities * shares[:, None], covariance_type, floor)
+        logs = _log_gaussians(samples, squares, mixture.means, mixture.covariances, covariance_type)
+        logs += np.log(mixture.weights)
+        highest = logs.max(axis=1, keepdims=True)
+        responsibilities = np.exp(logs - highest)
+        total = responsibilities.sum(axis=1, keepdims=True)
+        responsibilities /= total
+        current = float(shares @ (highest + np.log(total))[:, 0])
         if current - previous < TOLERANCE:
             break
         previous = current
@@ -146,19 +152,23 @@ def _maximise_likelihood(
 
 
 def _maximise(
-    samples: FloatArray, masses: FloatArray, covariance_type: CovarianceType, floor: float
+    samples: FloatArray,
+    squares: FloatArray | None,
+    masses: FloatArray,
+    covariance_type: CovarianceType,
+    floor: float,
 ) -> GaussianMixture:
     """M-step for (n, K) masses that sum to 1, with `floor` added to each variance."""
     # An empty component keeps a vanishing weight instead of dividing by zero.
     weights = masses.sum(axis=0) + 10 * np.finfo(float).tiny ** 0.5
     means = masses.T @ samples / weights[:, None]
     covariances: FloatArray
-    if covariance_type in ("full", "tied"):
+    if squares is None:
         scatter = np.stack([_scatter(samples - mean, mass) for mean, mass in zip(means, masses.T, strict=True)])
         covariances = scatter.sum(axis=0) if covariance_type == "tied" else scatter / weights[:, None, None]
         covariances = covariances + floor * np.eye(samples.shape[1])
     else:
-        scatter = np.stack([mass @ (samples - mean) ** 2 for mass, mean in zip(masses.T, means, strict=True)])
+        scatter = np.maximum(masses.T @ squares - weights[:, None] * means**2, 0)
         if covariance_type == "shared":
             covariances = scatter.sum(axis=0) + floor
         else:
@@ -173,9 +183,13 @@ def _scatter(centred: FloatArray, mass: FloatArray) -> FloatArray:
 
 
 def _log_gaussians(
-    samples: FloatArray, means: FloatArray, covariances: FloatArray, covariance_type: CovarianceType
+    samples: FloatArray,
+    squares: FloatArray | None,
+    means: FloatArray,
+    covariances: FloatArray,
+    covariance_type: CovarianceType,
 ) -> FloatArray:
-    """(n, K) log densities, without the weights."""
+    """(n, K) log densities, without the weights; `squares` of samples that are centred, if they are at hand."""
     n_components, dimension = means.shape
     if covariance_type in ("full", "tied"):
         matrices = np.broadcast_to(covariances, (n_components, dimension, dimension))
@@ -194,8 +208,9 @@ def _log_gaussians(
         half_log_determinants = np.log(variances).sum(axis=1) / 2
         # Σ (x − μ)² / v, multiplied out so that it is two matrix products. Centred first, against cancellation.
         centre = means.mean(axis=0)
-        x, mu = samples - centre, means - centre
-        distances = x**2 @ (1 / variances).T - 2 * x @ (mu / variances).T + (mu**2 / variances).sum(axis=1)
+        x, mu = (samples - centre, means - centre) if squares is None else (samples, means)
+        squared = x**2 if squares is None else squares
+        distances = squared @ (1 / variances).T - 2 * x @ (mu / variances).T + (mu**2 / variances).sum(axis=1)
     return np.asarray(-distances / 2 - half_log_determinants - dimension * np.log(2 * np.pi) / 2)
 
 

@@ -6,13 +6,18 @@ from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix, diags
+from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from .coarse import Level
 from .factor import NestedDissectionFactor
-from .laplacian import stiffness_matrix, unit_area_masses
 from .mesh import FloatArray, IntArray, TriangleMesh
+
+LARGE = 200_000
+"""Vertices from which posteriors are smoothed on cells."""
+CELLS_PER_LENGTH = 2.0
+"""Cells in a row along the smoothing length."""
 
 
 @dataclass(frozen=True)
@@ -50,12 +55,18 @@ class FaceAdjacency:
 def smooth_posteriors(mesh: TriangleMesh, posteriors: FloatArray, length: float) -> FloatArray:
     """Average (n, K) posteriors over the surface within about `length` (in units of the square root of its area).
 
-    One implicit step of heat flow, (M + t S) p' = M p with t = length²: the same on any meshing.
+    One implicit step of heat flow, (M + t S) p' = M p with t = length²: the same on any meshing. On a large surface it
+    is taken on cells a fraction of the length wide.
     """
-    masses = unit_area_masses(mesh)
-    system = csr_matrix(diags(masses) + length**2 * stiffness_matrix(mesh))
-    factor = NestedDissectionFactor(system, mesh.vertices, np.float64)
-    return factor.solve(masses[:, None] * posteriors)
+    level = Level.of(TriangleMesh(mesh.vertices / np.sqrt(mesh.area), mesh.faces))
+    right = level.mass @ posteriors.astype(np.float32)
+    prolongation = None
+    if mesh.n_vertices > LARGE:
+        prolongation, level = level.coarsened(round((CELLS_PER_LENGTH / length) ** 2))
+        right = prolongation.T @ right
+    system = csr_matrix(level.mass + np.float32(length**2) * level.stiffness)
+    smooth = NestedDissectionFactor(system, level.positions).solve(right)
+    return smooth if prolongation is None else np.asarray(prolongation @ smooth)
 
 
 def connected_regions(labels: IntArray, adjacency: FaceAdjacency) -> IntArray:

@@ -255,16 +255,22 @@ class PoseSegmentation:
         described = dict(zip(new, found, strict=True))
         poses = [described.get(i) or self._described(mesh) for i, mesh in enumerate(meshes)]
         tick("mixture", MOST)
-        samples = np.concatenate([self._scaled(pose.signature) for pose in poses])
         weights = np.concatenate([unit_area_masses(pose.surface.mesh) for pose in poses])
-        if self.n_segments > len(samples):
-            raise ValueError(f"n_segments is {self.n_segments}, but the poses have only {len(samples)} vertices")
+        if self.n_segments > len(weights):
+            raise ValueError(f"n_segments is {self.n_segments}, but the poses have only {len(weights)} vertices")
         shares = weights / weights.sum()
+        signatures = [pose.signature for pose in poses]
+        if len(shares) > MAX_SAMPLES:
+            drawn = np.sort(np.random.default_rng(self.random_state).choice(len(shares), MAX_SAMPLES, p=shares))
+            starts = np.cumsum([0, *(len(signature) for signature in signatures)])
+            first = np.searchsorted(drawn, starts)
+            signatures = [
+                signature[drawn[first[i] : first[i + 1]] - starts[i]] for i, signature in enumerate(signatures)
+            ]
+            shares = np.full(MAX_SAMPLES, 1 / MAX_SAMPLES)
+        samples = self._scaled(np.concatenate(signatures)).astype(np.float64)
         self.centre_ = shares @ samples
         self.spread_ = np.sqrt(shares @ (samples - self.centre_) ** 2) + np.finfo(float).eps
-        if len(samples) > MAX_SAMPLES:
-            drawn = np.random.default_rng(self.random_state).choice(len(samples), MAX_SAMPLES, p=shares)
-            samples, shares = samples[drawn], np.full(MAX_SAMPLES, 1 / MAX_SAMPLES)
         self.mixture_ = fit_mixture(
             (samples - self.centre_) / self.spread_,
             shares,
@@ -440,6 +446,7 @@ class PoseSegmentation:
         mixture = self._fitted()
         return mixture.posteriors(self._standardised(pose.signature))
 
+    @threadpool_limits.wrap(limits=1, user_api="blas")  # on arrays this small, threads wait for each other
     def _clean(
         self, poses: Sequence[PoseSignature], polygons: Sequence[IntArray] | None, min_share: float
     ) -> tuple[IntArray, FaceAdjacency]:

@@ -20,7 +20,7 @@ from scipy.linalg import eigh
 from scipy.sparse import csr_matrix, diags
 from threadpoolctl import threadpool_limits
 
-from .coarse import Level, edges_of
+from .coarse import Level
 from .hierarchy import LARGE, MIDDLE_CELLS_PER_PAIR, NotConvergedError, hierarchical_eigenpairs
 from .lanczos import SpectrumError, check, lanczos_eigenpairs
 from .laplacian import stiffness_matrix, unit_area_masses
@@ -164,14 +164,6 @@ class _Problem:
         place[order] = np.arange(len(order))
         return cls(TriangleMesh(mesh.vertices[order] / np.sqrt(mesh.area), place[mesh.faces]), place)
 
-    def level(self) -> Level:
-        """S x = λ M x in single precision."""
-        stiffness = csr_matrix(stiffness_matrix(self.mesh)).astype(np.float32)
-        stiffness.sort_indices()
-        masses = unit_area_masses(self.mesh)
-        mass = csr_matrix(diags(masses.astype(np.float32)))
-        return Level(self.mesh.vertices, edges_of(stiffness), masses, stiffness, mass)
-
     def operator(self) -> csr_matrix:
         """A = M^-½ S M^-½ of the standard form A ψ = λ ψ, ψ = M^½ φ."""
         inverse_root = diags(1 / self.root())
@@ -212,7 +204,7 @@ def _solved(
     dense = n <= DENSE_BELOW or (n_pairs > n // 4 and n <= DENSE_AT_MOST)
     if count and not dense and accuracy == "fast":
         try:
-            values, panels = hierarchical_eigenpairs(problem.level(), count, n_zero, tick)
+            values, panels = hierarchical_eigenpairs(Level.of(problem.mesh), count, n_zero, tick)
             constants: FloatArray = (zero_modes / problem.root()[:, None]).astype(np.float32)
             return np.concatenate([np.zeros(n_zero), values]), _behind(constants, panels)
         except NotConvergedError:
@@ -221,7 +213,7 @@ def _solved(
     if count and dense:
         values, vectors = _dense(problem.operator(), zero_modes, count)
     elif count:
-        values, vectors = lanczos_eigenpairs(problem.operator(), problem.level(), zero_modes, count, tick)
+        values, vectors = lanczos_eigenpairs(problem.operator(), Level.of(problem.mesh), zero_modes, count, tick)
     functions = np.concatenate([zero_modes, vectors], axis=1)
     functions /= problem.root()[:, None]
     return np.concatenate([np.zeros(n_zero), values]), _behind(functions, iter(()))
