@@ -1,58 +1,113 @@
-"""Eigensolvers on meshes of growing size: `python -m benchmarks.speed [--sizes 5000 20000] [--rounds 2]`.
+"""How fast, how exact, how much memory: `python -m benchmarks.speed [--output docs/speed.md]`.
 
-Each method runs in a process of its own on one BLAS thread, in turn (A, B, C, A, B, C), on meshes that the command
-makes: an even body, one of irregular triangles, one with a border, one with loose pieces. The reference is
-`scipy.sparse.linalg.eigsh` in shift-invert mode, as other libraries call it. Prints a Markdown table.
+Every solver runs in a process of its own on one BLAS thread, in turn (A, B, C, A, B, C), on meshes that the command
+makes. Reference is `scipy.sparse.linalg.eigsh` in shift-invert mode, as other libraries call it; errors are measured
+against our exact solver. Then the whole job in Blender by stage, and the floor that no method can pass.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib.util
+import json
 import os
+import platform
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable, Iterator, Sequence
+from datetime import date
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
+from scipy.sparse import csr_matrix
 from sklearn.metrics import adjusted_rand_score
+from threadpoolctl import threadpool_limits
 
-from benchmarks import shapes
-from wks_segment.core import (
-    TriangleMesh,
-    eigenpairs,
-    fit_mixture,
-    mass_matrix,
-    stiffness_matrix,
-    wave_kernel_signature,
-)  # fmt: skip
+from benchmarks import growth, shapes
+from benchmarks.solvers import METHODS, N_PAIRS
+from wks_segment.core import TriangleMesh, fit_mixture, stiffness_matrix
 from wks_segment.core.mesh import FloatArray
 from wks_segment.core.segmentation import SIGNATURE_OFFSET
 
-METHODS = ("eigsh", "fast", "exact")
-N_PAIRS = 300
 SEGMENTS = 8
+KINDS = ("even", "irregular", "border", "pieces")
+MOST_VERTICES = {"eigsh": 100_000, "lapy": 20_000, "exact": 1_000_000, "fast": 10_000_000}
+"""Above, a solver takes too long to wait for."""
+EVERY_KIND_UP_TO = 20_000
+"""Larger meshes are even or irregular, the largest even."""
+ROUNDS = 2
+HEADER = [
+    "mesh", "vertices", "solver", "CPU s", "× eigsh", "wall s", "memory MB", "eigenvalue error max, median", "WKS error",
+    "same ARI",
+]  # fmt: skip
 
 
 def main() -> None:
-    """Parse the command line and print the table, or do one measurement in a worker process."""
+    """Parse the command line and print all tables."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--sizes", type=int, nargs="+", default=[5_000, 20_000])
-    parser.add_argument("--rounds", type=int, default=2)
-    parser.add_argument("--kinds", nargs="+", default=["even", "irregular", "border", "pieces"])
-    parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=METHODS)
-    parser.add_argument("--worker", nargs=3, metavar=("METHOD", "MESH", "RESULT"), help=argparse.SUPPRESS)
+    parser.add_argument("--sizes", type=int, nargs="+", default=[5_000, 20_000, 100_000, 250_000, 1_000_000])
+    parser.add_argument("--kinds", nargs="+", default=list(KINDS), choices=KINDS)
+    parser.add_argument("--output", type=Path, help="also write the tables here, and a plot beside it in images/")
     options = parser.parse_args()
-    if options.worker:
-        work(*options.worker)
-        return
-    print("| mesh | vertices | method | CPU s | × eigsh | wall s | eigenvalue error max, median |"
-          " WKS error | same ARI |\n|" + "---|" * 9)  # fmt: skip
+    lines: list[str] = []
+
+    def say(line: str = "") -> None:
+        print(line, flush=True)
+        lines.append(line)
+
+    say("# Speed\n\nMade by `python -m benchmarks.speed --output docs/speed.md` in one run: " + machine() + "\n")
+    say(f"## Eigensolvers\n{N_PAIRS} pairs and the signature of 100 energies, from a mesh.\n")
+    say(table_row(HEADER) + "\n" + table_row(["---"] * len(HEADER)))
+    seconds: dict[str, dict[int, float]] = {}
     for size in options.sizes:
-        for kind in options.kinds:
-            compare(kind, make(kind, size), options.methods, options.rounds)
+        for kind in kinds_of(size, options.kinds):
+            for row, method, cpu in compare(kind, make(kind, size)):
+                say(table_row(row))
+                if kind == "even":
+                    seconds.setdefault(method, {})[size] = cpu
+    say(
+        "\n## The whole job\nWall seconds from the objects of a scene to written labels, and the share of each stage.\n"
+    )
+    for line in jobs():
+        say(line)
+    say("\n## The floor\nWhat every method has to do at least, on the even mesh: seconds on one thread.\n")
+    for line in floors(options.sizes):
+        say(line)
+    if options.output:
+        picture = options.output.parent / "images" / "speed.svg"
+        picture.write_text(growth.plot(seconds), encoding="utf-8")
+        say("\n## Growth\n![CPU seconds against vertices](images/speed.svg)")
+        options.output.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def machine() -> str:
+    """What the figures were measured on."""
+    model = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        model = next(
+            (line.split(":")[1].strip() for line in info.read_text().splitlines() if "model name" in line), model
+        )
+    return (
+        f"{date.today()}, {model}, {os.cpu_count()} cores, Python {platform.python_version()}, "
+        f"NumPy {np.__version__}, SciPy {scipy.__version__}."
+    )
+
+
+def table_row(cells: Sequence[str]) -> str:
+    """A line of a Markdown table."""
+    return "| " + " | ".join(cells) + " |"
+
+
+def kinds_of(size: int, kinds: Sequence[str]) -> list[str]:
+    """Kinds of mesh that are tried at a size."""
+    if size <= EVERY_KIND_UP_TO:
+        return list(kinds)
+    return [kind for kind in kinds if kind in (("even", "irregular") if size <= 100_000 else ("even",))]
 
 
 def make(kind: str, size: int) -> TriangleMesh:
@@ -63,69 +118,98 @@ def make(kind: str, size: int) -> TriangleMesh:
     return shapes.with_pieces(mesh) if kind == "pieces" else mesh
 
 
-def compare(kind: str, mesh: TriangleMesh, methods: list[str], rounds: int) -> None:
-    """Run all methods in turn and print their rows."""
+def compare(kind: str, mesh: TriangleMesh) -> Iterator[tuple[list[str], str, float]]:
+    """Run all solvers in turn; their rows of the table, names and CPU seconds."""
+    methods = [m for m in METHODS if mesh.n_vertices <= 1.2 * MOST_VERTICES[m]]
+    if importlib.util.find_spec("lapy") is None:
+        methods = [m for m in methods if m != "lapy"]
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "mesh.npz"
         np.savez(source, vertices=mesh.vertices, faces=mesh.faces)
         runs: dict[str, list[dict[str, Any]]] = {method: [] for method in methods}
-        for _ in range(rounds):
+        for turn in range(ROUNDS):
             for method in methods:
-                runs[method].append(run(method, source, Path(folder) / f"{method}.npz"))
-        reference = runs[methods[0]][0]
-        labels_of = labeller(reference["signature"], mesh.vertex_areas)
-        expected = labels_of(reference["signature"])
-        for method in methods:
-            best = min(runs[method], key=lambda r: r["cpu"])
-            times = np.median([b["cpu"] / r["cpu"] for b, r in zip(runs[methods[0]], runs[method], strict=True)])
-            above = reference["values"] > 1e-6 * reference["values"][-1]
-            error = np.abs(best["values"][above] / reference["values"][above] - 1)
-            wks = np.linalg.norm(best["signature"] - reference["signature"]) / np.linalg.norm(reference["signature"])
-            print(
-                f"| {kind} | {mesh.n_vertices:,} | {method} | {best['cpu']:.2f} | {times:.1f} | {best['wall']:.2f} "
-                f"| {error.max():.1e}, {np.median(error):.1e} | {100 * wks:.2f} % "
-                f"| {adjusted_rand_score(expected, labels_of(best['signature'])):.4f} |",
-                flush=True,
-            )
+                if turn == 0 or method == "fast" or mesh.n_vertices <= 1.2 * MOST_VERTICES["eigsh"]:
+                    runs[method].append(run(method, source, Path(folder) / "result.npz"))
+    truth = runs["exact"][0]
+    labels_of = labeller(truth["signature"], mesh.vertex_areas)
+    expected = labels_of(truth["signature"])
+    for method in methods:
+        best = min(runs[method], key=lambda r: r["cpu"])
+        pairs = zip(runs.get("eigsh", []), runs[method], strict=False)
+        times = [float(reference["cpu"] / mine["cpu"]) for reference, mine in pairs]
+        above = truth["values"] > 1e-6 * truth["values"][-1]
+        error = np.abs(best["values"][above] / truth["values"][above] - 1)
+        wks = np.linalg.norm(best["signature"] - truth["signature"]) / np.linalg.norm(truth["signature"])
+        row = [
+            kind, f"{mesh.n_vertices:,}", method, f"{best['cpu']:.2f}", f"{np.median(times):.1f}" if times else "–",
+            f"{best['wall']:.2f}", f"{best['memory']:,.0f}", f"{error.max():.1e}, {np.median(error):.1e}",
+            f"{100 * wks:.2f} %", f"{adjusted_rand_score(expected, labels_of(best['signature'])):.4f}",
+        ]  # fmt: skip
+        yield row, method, float(best["cpu"])
 
 
-def labeller(signature: FloatArray, areas: FloatArray) -> Any:
-    """A function from signatures to labels, by one mixture that is fitted on the reference."""
-    logs = np.log(signature + SIGNATURE_OFFSET)
+def labeller(signature: FloatArray, areas: FloatArray) -> Callable[[FloatArray], Any]:
+    """A function from signatures to labels, by one mixture that is fitted on the true signature."""
+    step = max(1, len(signature) // 100_000)
+    logs = np.log(signature[::step].astype(np.float64) + SIGNATURE_OFFSET)
     centre, spread = logs.mean(axis=0), logs.std(axis=0)
-    mixture = fit_mixture((logs - centre) / spread, areas, SEGMENTS)
+    mixture = fit_mixture((logs - centre) / spread, areas[::step], SEGMENTS)
     return lambda other: mixture.posteriors((np.log(other + SIGNATURE_OFFSET) - centre) / spread).argmax(axis=1)
 
 
 def run(method: str, source: Path, target: Path) -> dict[str, Any]:
     """One measurement in a fresh process on one thread."""
-    threads = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    command = [sys.executable, "-m", "benchmarks.speed", "--worker", method, str(source), str(target)]
-    subprocess.run(command, check=True, env={**os.environ, **threads})
+    command = [sys.executable, "-m", "benchmarks.solvers", method, str(source), str(target)]
+    subprocess.run(command, check=True, env={**os.environ, **threads(1)})
     with np.load(target) as result:
         return {name: result[name] for name in result.files}
 
 
-def work(method: str, source: str, target: str) -> None:
-    """Solve once and save eigenvalues, signature, seconds and memory."""
-    with np.load(source) as arrays:
-        mesh = TriangleMesh(arrays["vertices"], arrays["faces"])
-    cpu, wall = time.process_time(), time.perf_counter()
-    if method == "eigsh":
-        values, functions = by_eigsh(mesh)
-    else:
-        values, functions = eigenpairs(mesh, N_PAIRS, "fast" if method == "fast" else "exact")
-    cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
-    signature = wave_kernel_signature(values, functions)
-    np.savez(target, values=values, signature=signature, cpu=cpu, wall=wall)
+def threads(count: int) -> dict[str, str]:
+    """Environment that sets the threads of BLAS."""
+    return {"OMP_NUM_THREADS": str(count), "OPENBLAS_NUM_THREADS": str(count)}
 
 
-def by_eigsh(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
-    """SciPy's shift-invert Lanczos, as pyFM and the examples of robust_laplacian call it, on the area-1 surface."""
-    from scipy.sparse.linalg import eigsh
+def jobs() -> Iterator[str]:
+    """The whole job on one core and on two, and where poses are solved side by side."""
+    header: list[str] = []
+    for vertices, poses in ((10_000, 5), (100_000, 3)):
+        for workers in (1, 2):
+            command = [sys.executable, "-m", "benchmarks.job", "--vertices", str(vertices)]
+            command += ["--poses", str(poses), "--workers", str(workers)]
+            done = subprocess.run(command, check=True, capture_output=True, text=True)
+            stages = json.loads(done.stdout.splitlines()[-1])
+            if not header:
+                header = ["vertices", "poses", "side by side", "all", *stages]
+                yield table_row(header)
+                yield table_row(["---"] * len(header))
+            whole = sum(stage["wall"] for stage in stages.values())
+            cells = [f"{stage['wall']:.2f} ({100 * stage['wall'] / whole:.0f} %)" for stage in stages.values()]
+            yield table_row([f"{vertices:,}", str(poses), str(workers), f"{whole:.1f}", *cells])
 
-    values, functions = eigsh(stiffness_matrix(mesh), N_PAIRS, M=mass_matrix(mesh) / mesh.area, sigma=-0.01)
-    return np.maximum(values, 0), functions
+
+def floors(sizes: Sequence[int]) -> Iterator[str]:
+    """Time of the matrix, of one sparse product with all columns, and of one pass over the result."""
+    yield table_row(["vertices", "stiffness matrix", "one product S X", "one pass over X"])
+    yield table_row(["---"] * 4)
+    for size in sizes:
+        mesh = make("even", size)
+        with threadpool_limits(1):
+            assembly = clocked(stiffness_matrix, mesh)
+            matrix = csr_matrix(stiffness_matrix(mesh)).astype(np.float32)
+            columns = np.ones((size, 60), dtype=np.float32)
+            share = N_PAIRS / columns.shape[1]
+            product = share * min(clocked(matrix.__matmul__, columns) for _ in range(2))
+            sweep = share * min(clocked(np.sum, columns) for _ in range(2))
+        yield table_row([f"{size:,}", f"{assembly:.3f}", f"{product:.3f}", f"{sweep:.3f}"])
+
+
+def clocked(work: Callable[[Any], Any], argument: Any) -> float:
+    """CPU seconds of a call."""
+    start = time.process_time()
+    work(argument)
+    return time.process_time() - start
 
 
 if __name__ == "__main__":
