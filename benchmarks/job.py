@@ -11,6 +11,7 @@ import json
 import os
 import sys
 import time
+import traceback
 from collections.abc import Callable
 from typing import Any
 
@@ -43,10 +44,15 @@ def main() -> None:
             obj.select_set(True)
         bpy.context.view_layer.objects.active = obj
         print(json.dumps(run()))
+        code = 0
+    except Exception:
+        traceback.print_exc()
+        code = 1
     finally:
         wks_segment.blender.unregister()
-        sys.stdout.flush()
-        os._exit(0)  # some versions of bpy hang at exit
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)  # some versions of bpy hang at exit
 
 
 def run() -> dict[str, dict[str, float]]:

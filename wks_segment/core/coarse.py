@@ -244,8 +244,8 @@ def _middle_vertices(positions: FloatArray, masses: FloatArray, cell: IntArray, 
 def _adjacency(cell: IntArray, count: int, edges: tuple[IntArray, IntArray]) -> csr_matrix:
     """(count, count) matrix with an entry for each cell itself and for each that touches it."""
     a, b = cell[edges[0]], cell[edges[1]]
-    touch = csr_matrix((np.ones(len(a), dtype=np.int8), (a, b)), shape=(count, count))
-    return csr_matrix(csr_matrix(touch + touch.T + identity(count, dtype=np.int8, format="csr")) != 0)
+    touch = csr_matrix((np.ones(len(a), dtype=np.int32), (a, b)), shape=(count, count))
+    return csr_matrix(csr_matrix(touch + touch.T + identity(count, dtype=np.int32, format="csr")) != 0)
 
 
 def _pairs(cell: IntArray, adjacent: csr_matrix) -> tuple[IntArray, IntArray]:

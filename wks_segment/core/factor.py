@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import get_lapack_funcs
-from scipy.sparse import csr_matrix, tril
+from scipy.sparse import csc_matrix, csr_matrix, tril
 
 from .mesh import BoolArray, FloatArray, IntArray
 
@@ -117,7 +117,10 @@ def _inverse(block: FloatArray) -> tuple[FloatArray, int]:
     if failed:
         raise SingularError(f"a front of {len(block)} unknowns has no inverse")
     n_negative = np.count_nonzero(factor.diagonal()[pivots > 0] < 0) + np.count_nonzero(pivots < 0) // 2
-    return np.linalg.inv(np.tril(block) + np.tril(block, -1).T), int(n_negative)
+    try:
+        return np.linalg.inv(np.tril(block) + np.tril(block, -1).T), int(n_negative)
+    except np.linalg.LinAlgError as error:
+        raise SingularError(f"a front of {len(block)} unknowns has no inverse") from error
 
 
 def nested_dissection(matrix: csr_matrix, positions: FloatArray) -> tuple[IntArray, list[_Front]]:
@@ -163,7 +166,7 @@ def _neighbours(indptr: IntArray, indices: IntArray, rows: IntArray) -> tuple[In
 
 
 def _assemble(
-    lower: csr_matrix, front: _Front, updates: dict[int, FloatArray], place: IntArray, dtype: type[Any]
+    lower: csc_matrix, front: _Front, updates: dict[int, FloatArray], place: IntArray, dtype: type[Any]
 ) -> FloatArray:
     """Dense lower block of a front: its own entries and what its children left; finds what is `outside` of it."""
     begin, end = lower.indptr[front.first], lower.indptr[front.last]

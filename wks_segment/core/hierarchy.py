@@ -1,12 +1,14 @@
 """The fast eigensolver: a coarse solve, lifted to the surface level by level and corrected there.
 
-A correction is one step of inverse iteration, x ← x − ω (S + shift M)⁻¹ (S x − λ M x), with the ω that lowers the
-Rayleigh quotient most. It needs few digits, so that single precision is enough, and its size tells how far off a
-function was. Functions come out a panel of columns at a time: those of a large surface are never there all at once.
+A correction is one step of inverse iteration, x ← x − ω (S + shift M)⁻¹ (S x − λ M x), with the ω from 1 to 2 that
+lowers the Rayleigh quotient most. It needs few digits, so that single precision is enough, and its size tells how far
+off a function was. Functions come out a panel of columns at a time: those of a large surface are never there all at
+once.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -30,6 +32,8 @@ LARGEST_CHANGE, LARGEST_CHANGE_LATER = 0.07, 0.03
 signature within 0.2 to 0.6 % of the exact one. The latter where an earlier correction was larger."""
 LEAST_DIRECTION = 1e-5
 """Squared size of a direction among the changes, relative to the largest, below which it is rounding."""
+WORTH_A_DIRECTION = 0.01
+"""Relative change of a function from which it widens the subspace."""
 MAX_CORRECTIONS = 4
 """Corrections before the coarse space is refined."""
 LEAST_VALUE = 1e-6
@@ -48,8 +52,8 @@ PROBE_STEPS = 8
 DAMPING = 0.5
 """Share of Jacobi's step in the preconditioner."""
 
-PANEL = 7_500_000
-"""Numbers in one panel of functions, 30 MB: memory of that size is used again, larger pieces are given back."""
+PANEL = 15_000_000
+"""Numbers in one panel of functions, 60 MB: wide enough for the solve, and most of its memory is used again."""
 PRODUCT_COLUMNS = 64
 """Columns in one sparse product: what a row and its neighbours need should stay in the cache."""
 CHUNK = 1024
@@ -83,23 +87,23 @@ def hierarchical_eigenpairs(
     Raises
     ------
     NotConvergedError
-        If it cannot be done this way; seldom, if a very large surface shows that late, by the iterator.
+        If it cannot be done this way.
     """
     try:
         if len(level.areas) <= LARGE:
             values, vectors = _solve(level, _Correction(level, count), count, n_zero, tick)
             return values, ((columns, vectors[:, columns]) for columns in panels(*vectors.shape))
-        prolongation, cells = level.coarsened(MIDDLE_CELLS_PER_PAIR * count)
+        prolongation, cells = level.coarsened(MIDDLE_CELLS_PER_PAIR * count + n_zero)
         tick(0.3)
         on_cells = _Correction(cells, count)
         values, weights = _solve(cells, on_cells, count, n_zero, lambda share: tick(0.3 + 0.2 * share))
         change = _change_ahead(level, prolongation, on_cells, values, weights)
-        if change > LARGEST_CHANGE:
+        if not change <= LARGEST_CHANGE:
             raise NotConvergedError("the cells do not carry the functions of the surface")
         correction = _Correction(level, count) if change > LARGEST_CHANGE_OF_LIFTED else None
         tick(0.6)
         return values, _lifted(prolongation, values, weights, correction, lambda share: tick(0.6 + 0.4 * share))
-    except (SingularError, LinAlgError) as error:
+    except (SingularError, LinAlgError, ValueError) as error:  # SciPy answers NaN with a ValueError
         raise NotConvergedError(f"single precision does not suffice: {error}") from error
 
 
@@ -108,21 +112,24 @@ def _solve(
 ) -> tuple[FloatArray, FloatArray]:
     """Pairs from a coarse space, corrected on the level until corrections are small."""
     n_cells = round((MORE_CELLS_PER_PAIR if len(level.areas) > MANY else CELLS_PER_PAIR) * count)
+    n_cells = max(n_cells, 2 * (count + n_zero))
     while 2 * n_cells < len(level.areas):
         prolongation, cells = level.coarsened(n_cells, wide=True)
         tick(0.2)
         values, weights = coarse_eigenpairs(cells, n_zero, round((1 + SPARE_PAIRS) * count) + LEAST_SPARE)
+        if len(values) < count:
+            n_cells *= 2
+            continue
         vectors = times(prolongation, weights)
         tick(0.5)
         for step in range(MAX_CORRECTIONS):
-            change = 0.0
+            changes = np.empty(len(values))
             for columns in panels(len(vectors), len(values)):
                 panel = np.ascontiguousarray(vectors[:, columns])
-                values[columns], changes = correction(values[columns], panel)
+                values[columns], changes[columns] = correction(values[columns], panel)
                 vectors[:, columns] = panel
-                change = max(change, float(changes[: count - columns.start].max(initial=0.0)))
                 tick(0.5 + 0.4 * columns.stop / len(values))
-            if change > (LARGEST_CHANGE_LATER if step else LARGEST_CHANGE):
+            if not changes[:count].max() <= (LARGEST_CHANGE_LATER if step else LARGEST_CHANGE):
                 values, vectors = _enlarged(correction, vectors)
                 continue
             # The residual of a Ritz vector is orthogonal to all others, and so nearly is its correction.
@@ -179,16 +186,21 @@ class _Correction:
 
 
 def _enlarged(correction: _Correction, vectors: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """As many eigenpairs, the best within the span of vectors and their changes together (Rayleigh and Ritz).
+    """As many eigenpairs, the best within the span of vectors and their changes, where these are large.
 
-    Finds functions that the coarse space hardly held, as those of thin parts.
+    Finds functions that the coarse space hardly held, as those of thin parts (Rayleigh and Ritz).
     """
     level = correction.level
     zero_modes = level.zero_modes()
     values, vectors = _rayleigh_ritz(level, _without(zero_modes, level, vectors), vectors.shape[1])
-    changes = np.empty_like(vectors)
-    for columns in panels(len(vectors), len(values)):
-        changes[:, columns] = correction.change(values[columns], np.ascontiguousarray(vectors[:, columns]))[0]
+    large: list[FloatArray] = []
+    for columns in panels(*vectors.shape):
+        changes = correction.change(values[columns], np.ascontiguousarray(vectors[:, columns]))[0]
+        squares = _dots(changes, times(level.mass, changes))
+        large.append(changes[:, squares > WORTH_A_DIRECTION**2])
+    changes = np.hstack(large)
+    if not changes.shape[1]:
+        return values, vectors
     changes = _without(vectors, level, _without(zero_modes, level, changes))
     squares, directions = np.linalg.eigh((changes.T @ times(level.mass, changes)).astype(np.float64))
     kept = squares > LEAST_DIRECTION * squares[-1]
@@ -218,16 +230,20 @@ def _lifted(
 ) -> Iterator[tuple[slice, FloatArray]]:
     """Panels of functions from their values at cells, corrected on the surface where a correction is given.
 
-    What is M-normalised on the cells is so on the surface: Galerkin's mass matrix is that of the lifted functions. A
-    correction brings their values up to date in place.
+    What is M-normalised on the cells is so on the surface: Galerkin's mass matrix is that of the lifted functions. The
+    values stay those of the cells, which are known before the functions.
     """
     for columns in panels(prolongation.shape[0], len(values)):
         vectors = prolongation @ np.ascontiguousarray(weights[:, columns])
         if correction:
-            values[columns], changes = correction(values[columns], vectors)
+            changes = correction(values[columns], vectors)[1]
             # No second one: each also makes more of whatever lower functions are in there, which are not at hand.
-            if changes.max() > LARGEST_CHANGE:
-                raise NotConvergedError("corrections stay large")
+            if not changes.max() <= LARGEST_CHANGE:
+                warnings.warn(
+                    f"eigenfunctions {columns.start} to {columns.stop} of this very large mesh may be off by some per "
+                    "cent: compare with a decimated copy, or use the exact solver",
+                    stacklevel=2,
+                )
         yield columns, vectors
         tick(columns.stop / len(values))
 

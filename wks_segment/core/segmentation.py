@@ -190,7 +190,8 @@ class PoseSegmentation:
             try:
                 return self.describe(meshes[i], each[i], tick)
             except (ValueError, SpectrumError, MemoryError) as error:
-                raise type(error)(f"{called[i]}: {error}") from error
+                kind = next(kind for kind in (MemoryError, SpectrumError, ValueError) if isinstance(error, kind))
+                raise kind(f"{called[i]}: {error}") from error
             finally:
                 done[i] = 1.0
 
@@ -440,7 +441,8 @@ class PoseSegmentation:
         return np.log(signature + SIGNATURE_OFFSET) if self.scaling == "log" else signature
 
     def _standardised(self, signature: FloatArray) -> FloatArray:
-        return np.asarray((self._scaled(signature) - self.centre_) / self.spread_)
+        scaled = self._scaled(signature)  # a new array, or the signature itself; in its own precision
+        return np.asarray((scaled - self.centre_.astype(scaled.dtype)) / self.spread_.astype(scaled.dtype))
 
     def _posteriors(self, pose: PoseSignature) -> FloatArray:
         mixture = self._fitted()

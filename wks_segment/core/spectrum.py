@@ -117,15 +117,33 @@ def eigenpair_panels(
     stray = np.flatnonzero(~used)
     if stray.size:
         raise ValueError(f"vertex {stray[0]} belongs to no face ({stray.size} such vertices in all); remove it first")
-    needed, free = memory_needed(mesh.n_vertices, n_pairs, accuracy), available_memory()
+    _check_memory(mesh.n_vertices, n_pairs, accuracy)
+    problem, tick = _Problem.of(mesh), _rising(progress)
+    values, panels = _solved(problem, n_pairs, accuracy, tick)
+    return values, problem.place, _on_one_thread(panels, tick)
+
+
+def _check_memory(n_vertices: int, n_pairs: int, accuracy: Accuracy) -> None:
+    """Raise MemoryError, with both figures, if less is free than a solve needs."""
+    needed, free = memory_needed(n_vertices, n_pairs, accuracy), available_memory()
     if free is not None and needed > free:
         raise MemoryError(
-            f"{n_pairs} eigenpairs of {mesh.n_vertices:,} vertices need about {needed / 1e6:,.0f} MB of memory, and "
-            f"{free / 1e6:,.0f} MB are free: close other programs, or take fewer pairs or a coarser mesh"
+            f"{n_pairs} eigenpairs of {n_vertices:,} vertices ({accuracy}) need about {needed / 1e6:,.0f} MB of "
+            f"memory, and {free / 1e6:,.0f} MB are free: close other programs, or take fewer pairs or a coarser mesh"
         )
-    problem = _Problem.of(mesh)
-    values, panels = _solved(problem, n_pairs, accuracy, progress or (lambda share: None))
-    return values, problem.place, _on_one_thread(panels)
+
+
+def _rising(progress: Callable[[float], None] | None) -> Callable[[float], None]:
+    """Progress that stays where it is when a solve has to start again."""
+    reached = 0.0
+
+    def tick(share: float) -> None:
+        nonlocal reached
+        reached = max(reached, share)
+        if progress:
+            progress(reached)
+
+    return tick
 
 
 def memory_needed(n_vertices: int, n_pairs: int, accuracy: Accuracy) -> int:
@@ -133,18 +151,19 @@ def memory_needed(n_vertices: int, n_pairs: int, accuracy: Accuracy) -> int:
     if accuracy == "exact":
         return n_vertices * (2_000 + 46 * n_pairs)
     if n_vertices <= LARGE:
-        return n_vertices * (2_500 + 10 * n_pairs)
+        return n_vertices * (2_500 + 13 * n_pairs) + 600 * n_pairs**2
     return n_vertices * 1_900 + MIDDLE_CELLS_PER_PAIR * n_pairs * (2_500 + 10 * n_pairs)
 
 
-def _on_one_thread(panels: Panels) -> Panels:
+def _on_one_thread(panels: Panels, tick: Callable[[float], None]) -> Panels:
     """The same panels, each computed on one BLAS thread."""
     while True:
         with threadpool_limits(1, "blas"):
             panel = next(panels, None)
         if panel is None:
-            return
+            break
         yield panel
+    tick(1.0)
 
 
 @dataclass(frozen=True)
@@ -201,14 +220,15 @@ def _solved(
     zero_modes = problem.zero_modes()[:, :n_pairs]
     n_zero = zero_modes.shape[1]
     count = n_pairs - n_zero
-    dense = n <= DENSE_BELOW or (n_pairs > n // 4 and n <= DENSE_AT_MOST)
+    dense = n <= DENSE_BELOW or (n_pairs > n // 9 and n <= DENSE_AT_MOST)
     if count and not dense and accuracy == "fast":
         try:
             values, panels = hierarchical_eigenpairs(Level.of(problem.mesh), count, n_zero, tick)
             constants: FloatArray = (zero_modes / problem.root()[:, None]).astype(np.float32)
             return np.concatenate([np.zeros(n_zero), values]), _behind(constants, panels)
         except NotConvergedError:
-            warnings.warn("the fast eigensolver did not converge on this mesh; used the exact one", stacklevel=4)
+            warnings.warn("the fast eigensolver did not converge on this mesh; used the exact one", stacklevel=5)
+            _check_memory(n, n_pairs, "exact")
     values, vectors = np.zeros(0), np.zeros((n, 0))
     if count and dense:
         values, vectors = _dense(problem.operator(), zero_modes, count)
