@@ -2,7 +2,8 @@
 
 Every solver runs in a process of its own on one BLAS thread, in turn (A, B, C, A, B, C), on meshes that the command
 makes. Reference is `scipy.sparse.linalg.eigsh` in shift-invert mode, as other libraries call it; errors are measured
-against our exact solver. Then the whole job in Blender by stage, and the floor that no method can pass.
+against our exact solver. LaPy takes part where `pip install .[peers]` brought it. Then the whole job in Blender by
+stage, and the floor that no method can pass.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cholesky, eigh, solve_triangular
+from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular
 from scipy.sparse import coo_matrix, csr_matrix, diags, identity, vstack
 from scipy.sparse.csgraph import connected_components
 
@@ -112,6 +112,8 @@ def coarse_eigenpairs(level: Level, n_zero: int, count: int) -> tuple[FloatArray
     scipy.linalg.LinAlgError
         If single precision does not suffice.
     """
+    if not (np.isfinite(level.stiffness.data).all() and np.isfinite(level.mass.data).all()):
+        raise LinAlgError("the coarse space has entries that are not finite")
     mass = level.mass.toarray()
     mass[np.diag_indices_from(mass)] *= 1 + np.finfo(np.float32).eps
     factor = cholesky(mass, lower=True)

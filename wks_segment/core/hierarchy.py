@@ -103,7 +103,7 @@ def hierarchical_eigenpairs(
         correction = _Correction(level, count) if change > LARGEST_CHANGE_OF_LIFTED else None
         tick(0.6)
         return values, _lifted(prolongation, values, weights, correction, lambda share: tick(0.6 + 0.4 * share))
-    except (SingularError, LinAlgError, ValueError) as error:  # SciPy answers NaN with a ValueError
+    except (SingularError, LinAlgError) as error:
         raise NotConvergedError(f"single precision does not suffice: {error}") from error
 
 
@@ -212,6 +212,8 @@ def _rayleigh_ritz(level: Level, basis: FloatArray, count: int) -> tuple[FloatAr
     """The lowest eigenpairs within the span of a basis."""
     energy = (basis.T @ times(level.stiffness, basis)).astype(np.float64)
     gram = (basis.T @ times(level.mass, basis)).astype(np.float64)
+    if not (np.isfinite(energy).all() and np.isfinite(gram).all()):
+        raise NotConvergedError("corrections are not finite")
     values, rotation = eigh((energy + energy.T) / 2, gram, subset_by_index=[0, count - 1])
     return values, basis @ rotation.astype(np.float32)
 

@@ -228,7 +228,6 @@ def _orthonormal_to(basis: FloatArray, block: FloatArray) -> FloatArray:
 def _rayleigh_ritz(operator: csr_matrix, basis: FloatArray, known: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Best eigenpairs of A within the span of a basis, orthogonal to the `known` vectors."""
     basis = basis - known @ (known.T @ basis)
-    basis /= np.linalg.norm(basis, axis=0)  # inverse iteration has stretched what is near to the shift
     values, rotation = eigh(basis.T @ (operator @ basis), basis.T @ basis)
     return values, basis @ rotation
 

@@ -244,8 +244,8 @@ class PoseSegmentation:
         ------
         ValueError
             If there is no pose, a parameter is out of range, or there are fewer vertices than segments.
-        SpectrumError
-            If the eigenpairs of a pose could not be computed.
+        SpectrumError, MemoryError
+            If the eigenpairs of a pose could not be computed; see `describe`.
         """
         self._check_parameters()
         if not len(meshes):

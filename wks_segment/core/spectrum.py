@@ -67,7 +67,7 @@ def eigenpairs(
     -------
     values : (k,) array of float, rising
         Eigenvalues, without unit since the area is 1. Zero modes are exactly 0.
-    functions : (n, k) array of float (float32 from "fast")
+    functions : (n, k) array of float (float32 from "fast", but for small meshes)
         Eigenfunctions, orthonormal under M: φ_iᵀ M φ_j = δ_ij ("fast": to about 1e-2).
 
     Raises
