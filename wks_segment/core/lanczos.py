@@ -77,16 +77,7 @@ def lanczos_eigenpairs(
     shift, factor = _stable_factor(operator, level, SHIFT_WITHIN * highest, start)
     # One pair more, so that the inertia count has a gap to stand in behind the last pair that is handed out.
     values, vectors = _block_lanczos(factor, shift, zero_modes, start, count + 1, lambda share: tick(0.1 + 0.7 * share))
-    for _ in range(MAX_REPAIRS):
-        off = np.flatnonzero(_residuals(operator, values, vectors) > TOLERANCE / 2)
-        if not off.size:
-            break
-        # Lanczos leaves the functions far from the shift a few digits short, which inverse iteration brings back.
-        better = factor.solve(vectors[:, off])
-        better -= factor.solve(operator @ better - shift * better - vectors[:, off])
-        better /= np.linalg.norm(better, axis=0)
-        vectors[:, off] = better
-        values[off] = np.einsum("ij,ij->j", better, operator @ better)
+    _polish(operator, factor, shift, zero_modes, values, vectors)
     tick(0.9)
     for _ in range(MAX_REPAIRS):
         place = _widest_gap(values, count)
@@ -100,6 +91,7 @@ def lanczos_eigenpairs(
         again = np.random.default_rng(known.shape[1]).standard_normal(start.shape)
         more = _block_lanczos(factor, shift, known, again, missed, lambda share: tick(0.9))[1]
         values, vectors = _rayleigh_ritz(operator, np.hstack([vectors, more]), zero_modes)
+        _polish(operator, factor, shift, zero_modes, values, vectors)
     else:
         raise SpectrumError(f"{missed} of {count} eigenpairs were not found")
     values, vectors = values[:count], vectors[:, :count]
@@ -216,6 +208,30 @@ def _block_lanczos(
             complete = missing <= 0 or size > LAST_LOOK * count
             if exhausted or (complete and (left <= LANCZOS_TOLERANCE * np.abs(inverses[lowest])).all()):
                 return ritz[lowest], basis @ weights
+
+
+def _polish(
+    operator: csr_matrix,
+    factor: NestedDissectionFactor,
+    shift: float,
+    zero_modes: FloatArray,
+    values: FloatArray,
+    vectors: FloatArray,
+) -> None:
+    """Take the pairs whose residual is too large through inverse iteration, in place.
+
+    Lanczos and Rayleigh–Ritz leave functions far from the shift, and those of a thread of triangles, a few digits short.
+    """
+    for _ in range(MAX_REPAIRS):
+        off = _residuals(operator, values, vectors) > TOLERANCE / 2
+        if not off.any():
+            return
+        better = factor.solve(vectors[:, off])
+        better -= factor.solve(operator @ better - shift * better - vectors[:, off])
+        # It takes away what is far above the shift, but what is nearer to the shift than the pair itself grows.
+        better = _orthonormal_to(np.hstack([zero_modes, vectors[:, ~off]]), better)
+        values[off], rotation = eigh(better.T @ (operator @ better))
+        vectors[:, off] = better @ rotation
 
 
 def _orthonormal_to(basis: FloatArray, block: FloatArray) -> FloatArray:
