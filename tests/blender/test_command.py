@@ -567,10 +567,10 @@ def test_failed_run_leaves_an_older_output_as_it_was(command, tmp_path):
 # A process of its own
 
 
-def process(*arguments):
+def process(*arguments, **options):
     return subprocess.Popen(
         [sys.executable, "-m", "wks_segment", *map(str, arguments)],
-        cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options,
     )  # fmt: skip
 
 
@@ -601,7 +601,9 @@ def test_process_that_fails_ends_with_1_and_wrong_usage_with_2(tmp_path):
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT to send to another process")
 def test_process_that_is_interrupted_ends_at_once_and_does_not_crash(folder):
-    running = process("segment", folder / "walker.blend", "--frames", 20)
+    # A shell makes what it starts in the background ignore the signal, these tests and their processes among it.
+    heeding = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)}
+    running = process("segment", folder / "walker.blend", "--frames", 20, **heeding)
     for line in running.stderr:
         if "Signature" in line:
             break
