@@ -35,7 +35,7 @@ from wks_segment.core.mesh import FloatArray
 from wks_segment.core.segmentation import SIGNATURE_OFFSET
 
 SEGMENTS = 8
-KINDS = ("even", "irregular", "border", "pieces")
+KINDS = ("even", "irregular", "border", "pieces", "thin")
 MOST_VERTICES = {"eigsh": 100_000, "lapy": 20_000, "exact": 1_000_000, "fast": 10_000_000}
 """Above, a solver takes too long to wait for."""
 EVERY_KIND_UP_TO = 20_000
@@ -114,9 +114,8 @@ def kinds_of(size: int, kinds: Sequence[str]) -> list[str]:
 def make(kind: str, size: int) -> TriangleMesh:
     """The mesh of a kind."""
     mesh = shapes.body(size, irregular=kind == "irregular")
-    if kind == "border":
-        return shapes.with_border(mesh)
-    return shapes.with_pieces(mesh) if kind == "pieces" else mesh
+    changed = {"border": shapes.with_border, "pieces": shapes.with_pieces, "thin": shapes.thinned}
+    return changed[kind](mesh) if kind in changed else mesh
 
 
 def compare(kind: str, mesh: TriangleMesh) -> Iterator[tuple[list[str], str, float]]:

@@ -3,6 +3,7 @@ import pytest
 from shapes import creature, grid, icosphere, shaken, together
 
 from wks_segment.core import TriangleMesh, eigenpairs, hierarchy, lanczos, mass_matrix, spectrum, stiffness_matrix
+from wks_segment.core.coarse import Level
 from wks_segment.core.memory import available_memory
 
 
@@ -75,6 +76,20 @@ def test_parts_that_hang_by_a_thread_are_solved_exactly(radius, n_pairs):
     assert 0 < values[1] < 1
     mass = mass_matrix(mesh) / mesh.area
     np.testing.assert_allclose(functions.T @ mass @ functions, np.eye(n_pairs), atol=1e-8)
+
+
+def test_polish_takes_away_what_is_just_above_the_known_pairs_too():
+    mesh = creature(0.3, 3)
+    known = 40
+    problem = spectrum._Problem.of(mesh)
+    operator, zero_modes = problem.operator(), problem.zero_modes()
+    values, vectors = spectrum._dense(operator, zero_modes, 60)
+    factor = lanczos._factor(operator, Level.of(problem.mesh), lanczos.SHIFT_WITHIN * values[known])
+    error = vectors[:, known:] @ np.random.default_rng(0).standard_normal((60 - known, known))
+    wrong_values, wrong = values[:known].copy(), np.linalg.qr(vectors[:, :known] + 1e-9 * error)[0]
+    assert (lanczos._residuals(operator, wrong_values, wrong) > lanczos.TOLERANCE).any()
+    lanczos._polish(operator, factor, lanczos.SHIFT_WITHIN * values[known], zero_modes, wrong_values, wrong)
+    lanczos.check(operator, wrong_values, wrong)
 
 
 def test_each_component_has_a_zero_mode():

@@ -22,7 +22,9 @@ TOLERANCE = 1e-8
 ROUNDING = 16 * np.finfo(np.float64).eps
 """What rounding alone leaves of a residual, as a fraction of the operator's norm: felt where triangles are thin."""
 MAX_REPAIRS = 5
-"""Rounds in which missed pairs are looked for, and residuals reduced, before the solve counts as failed."""
+"""Rounds in which missed pairs are looked for before the solve counts as failed."""
+MAX_POLISHES = 8
+"""Steps in which residuals that are too large are reduced."""
 BLOCK = 16
 """Columns in a block."""
 SHIFT_WITHIN = 0.65
@@ -218,17 +220,21 @@ def _polish(
     values: FloatArray,
     vectors: FloatArray,
 ) -> None:
-    """Take the pairs whose residual is too large through inverse iteration, in place.
+    """Correct the pairs whose residual is too large by inverse iteration, in place.
 
     Lanczos and Rayleigh–Ritz leave functions far from the shift, and those of a thread of triangles, a few digits short.
+    A whole step, ψ − (A − shift)⁻¹ (A ψ − λ ψ), multiplies an error of eigenvalue μ by (λ − shift) / (μ − shift), which
+    takes away all that is far up, but lets what lies between the last value that is known and 2 shift − λ grow: every
+    other step is so much shorter that it takes away this.
     """
-    for _ in range(MAX_REPAIRS):
+    for i in range(MAX_POLISHES):
         off = _residuals(operator, values, vectors) > TOLERANCE / 2
         if not off.any():
             return
-        better = factor.solve(vectors[:, off])
-        better -= factor.solve(operator @ better - shift * better - vectors[:, off])
-        # It takes away what is far above the shift, but what is nearer to the shift than the pair itself grows.
+        worst_growth = (shift - values[off]) / (values[-1] - shift)
+        length = np.where((worst_growth > 1) & (i % 2 == 1), 2 / (worst_growth + 3), 1)
+        better = vectors[:, off]
+        better -= factor.solve(operator @ better - better * values[off]) * length
         better = _orthonormal_to(np.hstack([zero_modes, vectors[:, ~off]]), better)
         values[off], rotation = eigh(better.T @ (operator @ better))
         vectors[:, off] = better @ rotation
