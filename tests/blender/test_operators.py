@@ -21,7 +21,7 @@ from builders import (
 from wks_segment.blender import operators
 from wks_segment.blender import poses as reader
 from wks_segment.blender.poses import Character
-from wks_segment.core import PoseSegmentation
+from wks_segment.core import PoseSegmentation, hierarchy, spectrum
 
 pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
@@ -144,6 +144,18 @@ def test_one_pose_is_allowed_with_a_hint(printed):
     printed()
     assert OPS.learn() == {"FINISHED"}
     assert "Warning: Learned from one pose only" in printed().out
+
+
+def test_a_fallback_of_the_solver_reaches_the_user(settings, printed, monkeypatch):
+    def refuse(*arguments):
+        raise hierarchy.NotConvergedError
+
+    monkeypatch.setattr(spectrum, "hierarchical_eigenpairs", refuse)
+    monkeypatch.setattr(spectrum, "DENSE_BELOW", 0)
+    select(*limbed_poses(*BENDS))
+    printed()
+    assert OPS.learn() == {"FINISHED"}
+    assert printed().out.count("Warning: the fast eigensolver did not converge on this mesh") == 1
 
 
 def test_poses_that_are_all_the_same_give_a_hint(settings, printed):

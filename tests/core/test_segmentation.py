@@ -133,6 +133,41 @@ def test_progress_rises_to_one():
     assert fractions == sorted(fractions)
     assert fractions[-1] == 1.0
     assert seen[0][0] == "pose 1 of 2"
+    assert sum(stage == "mixture" for stage, _ in seen) > 10
+
+
+class StopError(Exception):
+    pass
+
+
+@pytest.mark.parametrize("stage", ["pose", "mixture"])
+def test_an_error_from_progress_ends_learning_in_the_middle_of_a_stage(stage):
+    calls = []
+
+    def progress(current, share):
+        if current.startswith(stage):
+            calls.append(current)
+            if len(calls) == 3:
+                raise StopError
+
+    learner = PoseSegmentation(**SMALL)
+    with pytest.raises(StopError):
+        learner.fit(POSES, progress=progress)
+    assert not hasattr(learner, "mixture_")
+
+
+def test_an_error_from_progress_ends_labelling(model):
+    described = [model.describe(mesh) for mesh in POSES]
+    shares = []
+
+    def progress(share):
+        shares.append(share)
+        if len(shares) == 2:
+            raise StopError
+
+    with pytest.raises(StopError):
+        model.segment_polygons(described, [np.arange(mesh.n_faces) for mesh in POSES], progress=progress)
+    assert shares == [1 / len(POSES), 2 / len(POSES)]
 
 
 @pytest.mark.parametrize(
@@ -186,14 +221,14 @@ def test_poses_described_side_by_side_are_those_described_one_by_one():
 
 
 def test_an_error_from_progress_ends_all_poses():
-    class Stop(Exception):  # noqa: N818
+    class StopError(Exception):  # noqa: N818
         pass
 
     def stop(stage, share):
         if share > 0:
-            raise Stop
+            raise StopError
 
-    with pytest.raises(Stop):
+    with pytest.raises(StopError):
         PoseSegmentation(**SMALL).describe_all(POSES, progress=stop, workers=2)
 
 

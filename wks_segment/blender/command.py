@@ -163,7 +163,7 @@ def _segment(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     if options.model:
         _save(model, options.model)
     if options.output or options.render:
-        _label(model, poses, described, settings, options, report)
+        _label(model, poses, described, settings, options, report, progress)
         report.warnings += tasks.segment_warnings(model, report)
     settings.keep_model(model, report.facts)
     if options.output:
@@ -181,7 +181,7 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     poses = _read(options, report)
     settings = _settings(options)
     described = tasks.describe(model, poses, report, progress)
-    _label(model, poses, described, settings, options, report)
+    _label(model, poses, described, settings, options, report, progress)
     settings.keep_model(model, [f"From {options.model.name}", f"{model.n_segments} segments"])
     if options.output:
         files.save_scene(options.output)
@@ -286,9 +286,9 @@ def _settings(options: argparse.Namespace) -> WKSSegmentSettings:
 
 def _label(
     model: PoseSegmentation, poses: list[Pose], described: list[Any], settings: WKSSegmentSettings,
-    options: argparse.Namespace, report: Report,
+    options: argparse.Namespace, report: Report, progress: Progress,
 ) -> None:  # fmt: skip
-    labels = tasks.label(model, poses, described, settings, report)
+    labels = tasks.label(model, poses, described, settings, report, progress)
     if options.output:
         tasks.write(labels, settings, report)
     if options.render:

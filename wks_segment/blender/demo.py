@@ -68,13 +68,15 @@ def run(
     training = [pose for pose, known in zip(poses, learned, strict=True) if known]
     others = [pose for pose, known in zip(poses, learned, strict=True) if not known]
     model, described = tasks.learn(training, settings, report, lambda stage, done: progress(stage, 0.5 * done))
-    together = tasks.label(model, training, described, settings, report)
+    together = tasks.label(model, training, described, settings, report, lambda stage, done: progress(stage, 0.5))
     tasks.write(together, settings, report)
 
-    described += tasks.describe(model, others, report, lambda stage, done: progress(stage, 0.5 + 0.4 * done))
-    progress("Labels", 0.9)
+    def later(stage: str, done: float) -> None:
+        progress(stage, 0.5 + 0.4 * done)
+
+    described += tasks.describe(model, others, report, later)
     labels_of = {
-        pose.name: tasks.label(model, [pose], [signature], settings, report)[character]
+        pose.name: tasks.label(model, [pose], [signature], settings, report, later)[character]
         for pose, signature in zip(training + others, described, strict=True)
     }
     own = [labels_of[pose.name] for pose in poses]

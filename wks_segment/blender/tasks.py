@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -126,9 +127,8 @@ def learn(
     model = settings.new_model()
     described = describe(model, poses, report, progress, share=0.9)
     with report.stage("mixture"):
-        progress("Learning the segments", 0.9)
         try:
-            model.fit(described)
+            model.fit(described, lambda stage, share: progress("Learning the segments", share))
         except ValueError as error:
             raise UserError(f"The segments could not be learned: {error}") from error
     report.n_segments = model.n_segments
@@ -147,25 +147,29 @@ def describe(
         for i, pose in enumerate(poses):
             first = next(j for j, other in enumerate(poses) if pose.is_mesh_of(other))
             if first == i:
+                progress(f'Seams of "{pose.name}"', 0.0)
                 welded[i] = weld(*(other.mesh for other in poses if pose.is_mesh_of(other)))
             welded[i] = welded[first]
     with report.stage("signature"):
         try:
-            described = model.describe_all(
-                [poses[i].mesh for i in new],
-                [welded[i] for i in new],
-                lambda stage, done: progress(f"Signature of {stage}", share * done),
-                [f'"{poses[i].name}"' for i in new],
-            )
+            with warnings.catch_warnings(record=True) as said:
+                warnings.simplefilter("always")
+                described = model.describe_all(
+                    [poses[i].mesh for i in new],
+                    [welded[i] for i in new],
+                    lambda stage, done: progress(f"Signature of {stage}", share * done),
+                    [f'"{poses[i].name}"' for i in new],
+                )
         except (ValueError, SpectrumError, MemoryError) as error:
             raise UserError(str(error)) from error
+        report.warnings += dict.fromkeys(str(warning.message) for warning in said)
     of = dict(zip(new, described, strict=True))
     return [of[first] for first in same]
 
 
 def label(
     model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[PoseSignature],
-    settings: WKSSegmentSettings, report: Report,
+    settings: WKSSegmentSettings, report: Report, progress: Progress,
 ) -> dict[Character, IntArray]:  # fmt: skip
     """Components of each character's polygons, agreed on by all of its poses, and by all objects that share a mesh."""
     labels: dict[Character, IntArray] = {}
@@ -173,8 +177,12 @@ def label(
         meshes = [tuple(obj.data for obj in pose.character.objects) for pose in poses]
         for mesh in dict.fromkeys(meshes):
             mine = [i for i, other in enumerate(meshes) if other == mesh]
+            name = poses[mine[0]].character.name
             found = model.segment_polygons(
-                [described[i] for i in mine], [poses[i].polygon_of for i in mine], settings.min_share / 100
+                [described[i] for i in mine],
+                [poses[i].polygon_of for i in mine],
+                settings.min_share / 100,
+                lambda share, name=name: progress(f'Labels of "{name}"', 1.0),
             )
             found = filled(found, poses[mine[0]].character)
             labels |= {poses[i].character: found for i in mine}

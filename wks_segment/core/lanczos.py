@@ -222,7 +222,7 @@ def _polish(
 ) -> None:
     """Correct the pairs whose residual is too large by inverse iteration, in place.
 
-    Lanczos and Rayleigh–Ritz leave functions far from the shift, and those of a thread of triangles, a few digits short.
+    Lanczos and Rayleigh–Ritz leave functions far from the shift, and those of a thread of triangles, some digits short.
     A whole step, ψ − (A − shift)⁻¹ (A ψ − λ ψ), multiplies an error of eigenvalue μ by (λ − shift) / (μ − shift), which
     takes away all that is far up, but lets what lies between the last value that is known and 2 shift − λ grow: every
     other step is so much shorter that it takes away this.

@@ -7,6 +7,7 @@ which is the paper's remedy against over-fitting; hence our own. Its k-means sta
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -28,6 +29,8 @@ TOLERANCE = 1e-4
 """EM ends when the mean log-likelihood rises by less than this in one round."""
 STARTS = 10
 """EM is started this often by k-means, on a sketch of the samples; the likeliest mixture is refined on all of them."""
+SKETCHED = 0.6
+"""Share of the work that the starts are."""
 SKETCH = 4_000
 """Samples in the sketch."""
 ROWS = 65_536
@@ -80,6 +83,7 @@ def fit_mixture(
     n_components: int,
     covariance_type: CovarianceType = "shared",
     random_state: int = 0,
+    progress: Callable[[float], None] | None = None,
 ) -> GaussianMixture:
     """Fit a mixture to weighted samples by expectation–maximisation, started by k-means.
 
@@ -95,6 +99,8 @@ def fit_mixture(
         See `GaussianMixture`.
     random_state : int
         Seed of k-means.
+    progress : callable, optional
+        Called with the share of the work that is done, 0 to 1, in every round. An error that it raises ends the work.
 
     Raises
     ------
@@ -111,8 +117,14 @@ def fit_mixture(
         sketch_shares = np.full(SKETCH, 1 / SKETCH)
     mean = shares @ samples
     floor = VARIANCE_FLOOR * float(shares @ ((samples - mean) ** 2).mean(axis=1))
+
+    def tick(share: float) -> None:
+        if progress:
+            progress(share)
+
     candidates = []
-    for seed in generator.integers(2**31, size=STARTS):
+    for i, seed in enumerate(generator.integers(2**31, size=STARTS)):
+        tick(SKETCHED * i / STARTS)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ConvergenceWarning)  # too few different samples: an error below
             kmeans = KMeans(n_components, n_init=1, random_state=int(seed))
@@ -122,21 +134,35 @@ def fit_mixture(
                 f"{n_components} components are too many: the samples have only {len(np.unique(start))} distinct values"
             )
         candidates.append(
-            _maximise_likelihood(sketch, sketch_shares, np.eye(n_components)[start], covariance_type, floor)
-        )
+            _maximise_likelihood(
+                sketch, sketch_shares, np.eye(n_components)[start], covariance_type, floor,
+                lambda share, begun=i: tick(SKETCHED * (begun + share) / STARTS),  # type: ignore[misc]
+            )
+        )  # fmt: skip
     best = max(candidates, key=lambda candidate: candidate[1])[0]
-    return _in_order(_maximise_likelihood(samples, shares, best.posteriors(samples), covariance_type, floor)[0])
+    refined, _ = _maximise_likelihood(
+        samples, shares, best.posteriors(samples), covariance_type, floor,
+        lambda share: tick(SKETCHED + (1 - SKETCHED) * share),
+    )  # fmt: skip
+    tick(1.0)
+    return _in_order(refined)
 
 
 def _maximise_likelihood(
-    samples: FloatArray, shares: FloatArray, start: FloatArray, covariance_type: CovarianceType, floor: float
+    samples: FloatArray,
+    shares: FloatArray,
+    start: FloatArray,
+    covariance_type: CovarianceType,
+    floor: float,
+    tick: Callable[[float], None],
 ) -> tuple[GaussianMixture, float]:
     """EM from (n, K) responsibilities; the mixture and its mean log-likelihood."""
     responsibilities, previous = start, -np.inf
     # What both steps need of the samples if covariances are diagonal, once: they come standardised, so that sums of
     # squares lose no digits.
     squares = None if covariance_type in ("full", "tied") else samples**2
-    for _ in range(MAX_ITERATIONS):
+    for i in range(MAX_ITERATIONS):
+        tick(i / MAX_ITERATIONS)
         mixture = _maximise(samples, squares, responsibilities * shares[:, None], covariance_type, floor)
         logs = _log_gaussians(samples, squares, mixture.means, mixture.covariances, covariance_type)
         logs += np.log(mixture.weights)

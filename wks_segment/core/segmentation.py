@@ -238,7 +238,7 @@ class PoseSegmentation:
             The poses; they need not share their meshing. Each counts the same, whatever its size and number of
             vertices. One pose alone is allowed, but says nothing of what a pose changes.
         progress
-            Called while the poses are described and before the mixture is fitted.
+            Called while the poses are described and the mixture is fitted.
 
         Raises
         ------
@@ -278,6 +278,7 @@ class PoseSegmentation:
             self.n_segments,
             "shared" if self.covariance_type == "auto" else self.covariance_type,
             self.random_state,
+            lambda share: tick("mixture", MOST + (1 - MOST) * share),
         )
         tick("done", 1.0)
         return self
@@ -325,6 +326,7 @@ class PoseSegmentation:
         poses: Sequence[TriangleMesh | PoseSignature],
         polygons: Sequence[IntArray],
         min_share: float = MIN_SHARE,
+        progress: Callable[[float], None] | None = None,
     ) -> IntArray:
         """Label the polygons of one mesh, seen in one or several poses, as `segment_faces` does.
 
@@ -335,6 +337,8 @@ class PoseSegmentation:
         polygons
             For each pose, the polygon that each triangle is a piece of; several triangles can be of one polygon, and
             -1 stands for a triangle of none, which shapes the surface but has no say.
+        progress
+            Called after each pose with the share that is done, 0 to 1. An error that it raises ends the work.
 
         Returns
         -------
@@ -355,7 +359,7 @@ class PoseSegmentation:
                 raise ValueError(
                     f"pose {i} has {pose.surface.original.n_faces} triangles, but polygons for {np.shape(polygon_of)}"
                 )
-        return self._clean(described, polygons, min_share)[0]
+        return self._clean(described, polygons, min_share, progress)[0]
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the fitted model to a JSON file that holds data only.
@@ -450,7 +454,11 @@ class PoseSegmentation:
 
     @threadpool_limits.wrap(limits=1, user_api="blas")  # on arrays this small, threads wait for each other
     def _clean(
-        self, poses: Sequence[PoseSignature], polygons: Sequence[IntArray] | None, min_share: float
+        self,
+        poses: Sequence[PoseSignature],
+        polygons: Sequence[IntArray] | None,
+        min_share: float,
+        progress: Callable[[float], None] | None = None,
     ) -> tuple[IntArray, FaceAdjacency]:
         """Labels of polygons (None: each triangle is one) from the mean posterior of all poses, and neighbours."""
         if not 0 <= min_share < 1:
@@ -475,6 +483,8 @@ class PoseSegmentation:
             areas += total * seen
             poses_seen += seen
             borders.append(FaceAdjacency.of(surface.welded_faces, original.vertices).between_polygons(polygon_of))
+            if progress:
+                progress(len(borders) / len(poses))
         seen = poses_seen > 0
         # Of one mesh the borders are the same in every pose; modifiers may hide some of them in one.
         adjacency = max(borders, key=lambda border: len(border.pairs))

@@ -34,7 +34,7 @@ class WKS_SEGMENT_OT_apply(bpy.types.Operator):
                 with report.stage("read"):
                     report.poses = reader.read_objects(context, group(mesh_objects(context.selected_objects)))
                 described = tasks.describe(model, report.poses, report, progress)
-                labels = tasks.label(model, report.poses, described, settings, report)
+                labels = tasks.label(model, report.poses, described, settings, report, progress)
                 tasks.write(labels, settings, report)
         except UserError as error:
             self.report({"ERROR"}, str(error))

@@ -27,7 +27,7 @@ class WKS_SEGMENT_OT_learn(bpy.types.Operator):
             with feedback.cursor_progress(context) as progress:
                 poses = tasks.read_training_poses(context, settings, report)
                 model, described = tasks.learn(poses, settings, report, progress)
-                labels = tasks.label(model, poses, described, settings, report)
+                labels = tasks.label(model, poses, described, settings, report, progress)
                 tasks.write(labels, settings, report)
                 report.warnings += tasks.segment_warnings(model, report)
         except UserError as error:
