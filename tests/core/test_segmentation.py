@@ -221,7 +221,7 @@ def test_poses_described_side_by_side_are_those_described_one_by_one():
 
 
 def test_an_error_from_progress_ends_all_poses():
-    class StopError(Exception):  # noqa: N818
+    class StopError(Exception):
         pass
 
     def stop(stage, share):
