@@ -49,6 +49,7 @@ def main() -> int:
     parser.add_argument("--output", type=Path, default=Path("demo/characters"))
     parser.add_argument("--segments", default="8")
     parser.add_argument("--covariance", default="auto")
+    parser.add_argument("--pieces", default="joined")
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
     paths = sorted(path for path in options.folder.iterdir() if path.suffix in FILES)
@@ -58,6 +59,7 @@ def main() -> int:
         f"| character | vertices | CPU s a pose | agreement learned | agreement unseen | worst unseen |\n|{'---|' * 6}"
     )
     settings = ["--segments", options.segments, "--covariance", options.covariance]
+    settings += ["--pieces", options.pieces]
     results = [measure(path, options.output, settings) for path in paths]
     done = [result for result in results if "error" not in result]
     mean = [np.mean([result[key] for result in done]) for key in ("learned", "unseen", "worst")]

@@ -73,7 +73,7 @@ def run() -> dict[str, dict[str, float]]:
 
     model = settings.new_model()
     poses = timed("read", lambda: tasks.read_training_poses(bpy.context, settings, report))
-    described = timed("weld, eigenpairs, signature", lambda: tasks.describe(model, poses, report, quiet))
+    described = timed("connect, eigenpairs, signature", lambda: tasks.describe(model, poses, report, quiet))
     timed("mixture", lambda: model.fit(described))
     labels = timed("label", lambda: tasks.label(model, poses, described, settings, report, quiet))
     timed("write", lambda: tasks.write(labels, settings, report))

@@ -12,6 +12,8 @@ BLENDERS_OWN = {"bpy", "bmesh", "mathutils", "bpy_extras", "gpu", "blf", "aud"}
 CHAIN = [
     "memory",
     "mesh",
+    "repair",
+    "pieces",
     "surface",
     "laplacian",
     "factor",

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from shapes import grid, icosphere, split_at_every_corner, together
 
-from wks_segment.core import TriangleMesh, prepare_surface, weld
+from wks_segment.core import TriangleMesh, connect, prepare_surface
 
 
 def test_a_soup_of_triangles_is_welded_to_the_surface_it_was():
@@ -23,7 +23,7 @@ def test_surfaces_that_only_touch_are_not_welded():
     # Two closed spheres that share a point, as lips or a hand on the hip do: no open border, no seam.
     a = icosphere(2)
     b = TriangleMesh(a.vertices + (a.vertices[0] - a.vertices[3]), a.faces)
-    assert prepare_surface(together(a, b)).n_components == 2
+    assert prepare_surface(together(a, b), pieces="separate").n_components == 2
 
 
 def test_each_vertex_gets_its_value_back():
@@ -82,7 +82,7 @@ def test_pieces_that_meet_in_some_poses_stay_apart_in_all():
     touching = together(upper, TriangleMesh(lower.vertices + (1, 0, 0), lower.faces))
     apart = together(upper, TriangleMesh(lower.vertices + (1.5, 0, 0), lower.faces))
     assert prepare_surface(touching).n_components == 1
-    assert prepare_surface(touching, welded=weld(touching, apart)).n_components == 2
+    assert prepare_surface(touching, connection=connect(touching, apart, pieces="separate")).n_components == 2
 
 
 def test_tiny_loose_parts_stay_out_and_take_the_value_next_to_them():
@@ -96,4 +96,5 @@ def test_tiny_loose_parts_stay_out_and_take_the_value_next_to_them():
 
 def test_nothing_but_many_small_parts_is_still_a_surface():
     cards = [TriangleMesh(grid(1, 1).vertices + (2 * i, 0, 0), grid(1, 1).faces) for i in range(1500)]
-    assert prepare_surface(together(*cards)).n_components == 100
+    assert prepare_surface(together(*cards), pieces="separate").n_components == 100
+    assert prepare_surface(together(*cards)).n_components == 1

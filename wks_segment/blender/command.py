@@ -30,6 +30,7 @@ OPTIONS = {
     "--energies": "n_energies",
     "--covariance": "covariance_type",
     "--scaling": "scaling",
+    "--pieces": "pieces",
     "--smallest-part": "min_share",
 }
 """Options that are settings: their text, limits and defaults come from the property group."""

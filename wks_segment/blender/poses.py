@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..core import TriangleMesh
 from ..core.mesh import FloatArray, IntArray, repeats_a_vertex
-from .characters import Character
+from .characters import Character, armature_of
 from .errors import UserError
 
 ORIGIN = ".wks_segment_origin"
@@ -42,12 +42,16 @@ class Pose:
     polygon_of : (m,) int array
         The polygon that each triangle comes from; the polygons of all objects are numbered one object after another.
         -1: a modifier made it of nothing of the character's own.
+    rest : TriangleMesh, optional
+        The same triangles in the rest position of the character's armature, if it has one: where the artist put loose
+        parts together.
     """
 
     name: str
     character: Character
     mesh: TriangleMesh
     polygon_of: IntArray
+    rest: TriangleMesh | None = None
 
     def is_like(self, other: Pose) -> bool:
         """Whether the other pose is the same surface at the same place."""
@@ -72,7 +76,7 @@ def polygon_ranges(character: Character) -> list[tuple[bpy.types.Object, slice]]
 
 def read_objects(context: bpy.types.Context, characters: Sequence[Character]) -> list[Pose]:
     """Each character as it is now, one pose each."""
-    return [read_pose(context, character, character.name) for character in characters]
+    return [with_rest(context, [read_pose(context, character, character.name)])[0] for character in characters]
 
 
 def read_frames(context: bpy.types.Context, character: Character, frames: Sequence[int]) -> list[Pose]:
@@ -84,7 +88,7 @@ def read_frames(context: bpy.types.Context, character: Character, frames: Sequen
         for frame in frames:
             scene.frame_set(frame)
             poses.append(read_pose(context, character, f"{character.name}, frame {frame}"))
-        return poses
+        return with_rest(context, poses)
     finally:
         scene.frame_set(before, subframe=subframe)
 
@@ -115,7 +119,7 @@ def read_shape_keys(context: bpy.types.Context, character: Character, count: int
                 obj.show_only_shape_key = True
                 obj.active_shape_key_index = max(obj.data.shape_keys.key_blocks.find(name), 0)
             poses.append(read_pose(context, character, f"{character.name}, {name}"))
-        return poses
+        return with_rest(context, poses)
     finally:
         for obj, active, pinned in before:
             obj.active_shape_key_index, obj.show_only_shape_key = active, pinned
@@ -135,6 +139,24 @@ def own_frames(scene: bpy.types.Scene, character: Character, count: int) -> list
     first, last = min(first for first, _ in ranges), max(last for _, last in ranges)
     middles = first + (np.arange(count) + 0.5) * (last - first) / count
     return np.unique(middles.round().astype(int)).tolist()
+
+
+def with_rest(context: bpy.types.Context, poses: list[Pose]) -> list[Pose]:
+    """Poses of one character together with its rest position, where its armature has one of the same triangles."""
+    character = poses[0].character
+    armatures = dict.fromkeys(obj.data for obj in map(armature_of, character.objects) if obj is not None)
+    if not armatures:
+        return poses
+    before = {armature: armature.pose_position for armature in armatures}
+    try:
+        for armature in armatures:
+            armature.pose_position = "REST"
+        rest = read_pose(context, character, f"{character.name}, rest position")
+    finally:
+        for armature, position in before.items():
+            armature.pose_position = position
+        context.view_layer.update()
+    return [replace(pose, rest=rest.mesh) if pose.is_mesh_of(rest) else pose for pose in poses]
 
 
 def read_pose(context: bpy.types.Context, character: Character, name: str) -> Pose:

@@ -11,7 +11,7 @@ from ..core import PoseSegmentation
 from .palette import MAX_COLOURS
 
 MODEL_PARAMETERS = (
-    "n_segments", "n_eigenpairs", "n_energies", "covariance_type", "scaling", "random_state",
+    "n_segments", "n_eigenpairs", "n_energies", "covariance_type", "scaling", "random_state", "pieces",
 )  # fmt: skip
 
 
@@ -85,6 +85,15 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
             ("raw", "As in the Paper", "The signature itself; the finest parts dominate"),
         ],
         default="log",
+    )
+    pieces: EnumProperty(
+        name="Loose Parts",
+        description="How parts that are not connected belong together, as eyes, clothes and armor",
+        items=[
+            ("joined", "By the Whole Character", "Each loose part counts as grown to what it is nearest to"),
+            ("separate", "Each on Its Own", "Loose parts of one shape get one segment wherever they are"),
+        ],
+        default="joined",
     )
     min_share: FloatProperty(
         name="Smallest Part",

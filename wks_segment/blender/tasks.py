@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..core import PoseSegmentation, PoseSignature, SpectrumError, weld
+from ..core import Connection, PoseSegmentation, PoseSignature, SpectrumError, connect
 from ..core.mesh import IntArray
 from ..core.segmentation import Progress
 from . import poses as reader
@@ -141,22 +141,26 @@ def describe(
     """Signature of each pose; poses that are one and the same surface are computed once."""
     same = [next((j for j in range(i) if pose.is_like(poses[j])), i) for i, pose in enumerate(poses)]
     new = [i for i, first in enumerate(same) if first == i]
-    with report.stage("weld"):
+    with report.stage("connect"):
         # One surface in all poses of a mesh, also where pieces of it meet in some.
-        welded: dict[int, IntArray] = {}
+        connections: dict[int, Connection] = {}
         for i, pose in enumerate(poses):
             first = next(j for j, other in enumerate(poses) if pose.is_mesh_of(other))
             if first == i:
                 progress(f'Seams of "{pose.name}"', 0.0)
-                welded[i] = weld(*(other.mesh for other in poses if pose.is_mesh_of(other)))
-            welded[i] = welded[first]
+                alike = [other.mesh for other in poses if pose.is_mesh_of(other)]
+                try:
+                    connections[i] = connect(*alike, rest=pose.rest, pieces=model.pieces)
+                except ValueError as error:
+                    raise UserError(f'"{pose.name}": {error}') from error
+            connections[i] = connections[first]
     with report.stage("signature"):
         try:
             with warnings.catch_warnings(record=True) as said:
                 warnings.simplefilter("always")
                 described = model.describe_all(
                     [poses[i].mesh for i in new],
-                    [welded[i] for i in new],
+                    [connections[i] for i in new],
                     lambda stage, done: progress(f"Signature of {stage}", share * done),
                     [f'"{poses[i].name}"' for i in new],
                 )

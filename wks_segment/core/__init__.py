@@ -7,9 +7,10 @@ from .model_file import ModelFileError
 from .segmentation import PoseSegmentation, PoseSignature
 from .signature import heat_kernel_signature, wave_kernel_signature
 from .spectrum import SpectrumError, eigenpairs
-from .surface import Surface, prepare_surface, weld
+from .surface import Connection, Surface, connect, prepare_surface
 
 __all__ = [
+    "Connection",
     "GaussianMixture",
     "ModelFileError",
     "PoseSegmentation",
@@ -17,6 +18,7 @@ __all__ = [
     "SpectrumError",
     "Surface",
     "TriangleMesh",
+    "connect",
     "eigenpairs",
     "fit_mixture",
     "heat_kernel_signature",
@@ -24,5 +26,4 @@ __all__ = [
     "prepare_surface",
     "stiffness_matrix",
     "wave_kernel_signature",
-    "weld",
 ]

@@ -14,6 +14,8 @@ from .mesh import FloatArray, TriangleMesh
 MIN_DOUBLE_AREA = 1e-4
 """Least double area of a triangle in the cotangents, as a fraction of its longest edge squared: a thinner one glues its
 corners together no more than that, which is enough, and leaves single precision its digits."""
+LINK = 1.0
+"""Weight of a link: about that of an edge between two equilateral triangles, 0.58."""
 MIN_MASS = 1e-3
 """Least mass of a vertex, as a fraction of the mean."""
 
@@ -21,7 +23,7 @@ MIN_MASS = 1e-3
 def stiffness_matrix(mesh: TriangleMesh) -> csc_matrix:
     """Stiffness matrix S of the cotangent weights.
 
-    S_ij = −(cot α_ij + cot β_ij) / 2 for an edge ij, with the angles opposite to it; S_ii = −Σ_j S_ij.
+    S_ij = −(cot α_ij + cot β_ij) / 2 for an edge ij, with the angles opposite to it; −1 for a link; S_ii = −Σ_j S_ij.
 
     Parameters
     ----------
@@ -41,8 +43,9 @@ def stiffness_matrix(mesh: TriangleMesh) -> csc_matrix:
     cotangents = (squared.sum(axis=1)[:, None] - 2 * squared) / (2 * double_area[:, None])
     i = np.roll(mesh.faces, -1, axis=1).ravel()
     j = np.roll(mesh.faces, -2, axis=1).ravel()
-    half = np.concatenate([cotangents.ravel(), cotangents.ravel()]) / 2
-    weights = csr_matrix((half, (np.concatenate([i, j]), np.concatenate([j, i]))), shape=(mesh.n_vertices,) * 2)
+    i, j = np.append(i, mesh.links[:, 0]), np.append(j, mesh.links[:, 1])
+    weight = np.append(cotangents.ravel() / 2, np.full(len(mesh.links), LINK))
+    weights = csr_matrix((np.append(weight, weight), (np.append(i, j), np.append(j, i))), shape=(mesh.n_vertices,) * 2)
     return csc_matrix(diags(np.asarray(weights.sum(axis=1)).ravel()) - weights)
 
 

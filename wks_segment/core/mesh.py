@@ -23,6 +23,8 @@ class TriangleMesh:
         Positions, in any unit.
     faces : (m, 3) array of int
         Vertex indices of each triangle, in either orientation.
+    links : (l, 2) array of int, optional
+        Pairs of vertices that are tied to each other as if they were neighbours, where loose parts meet.
 
     Raises
     ------
@@ -31,13 +33,19 @@ class TriangleMesh:
         twice, there is no face, or the whole surface has no area. The message says which one and where.
     """
 
-    def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike, links: ArrayLike | None = None) -> None:
         self.vertices: FloatArray = _checked_vertices(vertices)
         self.faces: IntArray = _checked_faces(faces, len(self.vertices))
+        self.links: IntArray = _checked_links(links, len(self.vertices))
         if not self.area > 0:
             raise ValueError("the mesh has no area: all its faces are points or lines; check the scale of the mesh")
         self.vertices.setflags(write=False)
         self.faces.setflags(write=False)
+        self.links.setflags(write=False)
+
+    def moved(self, vertices: FloatArray) -> TriangleMesh:
+        """The same faces and links between vertices at other places."""
+        return TriangleMesh(vertices, self.faces, self.links)
 
     @property
     def n_vertices(self) -> int:
@@ -70,8 +78,8 @@ class TriangleMesh:
 
     @cached_property
     def components(self) -> IntArray:
-        """(n,) which loose part each vertex belongs to, numbered 0, 1, …; a vertex without a face is one by itself."""
-        a, b = self.faces[:, [0, 1]].ravel(), self.faces[:, [1, 2]].ravel()
+        """(n,) which part each vertex belongs to, numbered 0, 1, …; a vertex without face or link is one by itself."""
+        a, b = np.concatenate([self.faces[:, [0, 1]], self.faces[:, [1, 2]], self.links]).T
         graph = coo_matrix((np.ones(len(a), dtype=np.int8), (a, b)), shape=(self.n_vertices,) * 2)
         return connected_components(graph, directed=False)[1].astype(np.int64)
 
@@ -111,6 +119,27 @@ def _checked_faces(faces: ArrayLike, n_vertices: int) -> IntArray:
     if bad.size:
         raise ValueError(f"face {bad[0]} uses a vertex twice: {array[bad[0]].tolist()} ({bad.size} such faces in all)")
     return array
+
+
+def _checked_links(links: ArrayLike | None, n_vertices: int) -> IntArray:
+    array = np.array([] if links is None else links, dtype=np.int64).reshape(-1, 2)
+    if ((array < 0) | (array >= n_vertices)).any():
+        raise ValueError(f"a link points to a vertex that does not exist; the mesh has {n_vertices} vertices")
+    return array
+
+
+def edges_of(faces: IntArray) -> IntArray:
+    """(3 m, 2) edges of each triangle in turn, the lower vertex first; an edge of two triangles is there twice."""
+    return np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+
+
+def unique_edges(faces: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """(e, 2) edges of triangles, each once; (3 m,) the one that each of `edges_of` is; (e,) how many faces it has."""
+    edges = edges_of(faces)
+    base = int(edges.max()) + 1
+    # One number an edge: sorted ten times as fast as pairs.
+    keys, which, count = np.unique(edges @ np.array([base, 1]), return_inverse=True, return_counts=True)
+    return np.stack([keys // base, keys % base], axis=1), which, count
 
 
 def repeats_a_vertex(faces: IntArray) -> BoolArray:

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from .coarse import Level
 from .factor import NestedDissectionFactor
-from .mesh import FloatArray, IntArray, TriangleMesh
+from .mesh import FloatArray, IntArray, TriangleMesh, edges_of
 
 LARGE = 200_000
 """Vertices from which posteriors are smoothed on cells."""
@@ -38,7 +38,7 @@ class FaceAdjacency:
     @classmethod
     def of(cls, faces: IntArray, vertices: FloatArray) -> FaceAdjacency:
         """Find the neighbours of (m, 3) faces with corners in (n, 3) vertices."""
-        edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        edges = edges_of(faces)
         order = np.lexsort((edges[:, 1], edges[:, 0]))
         edges, owner = edges[order], order // 3
         same = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
@@ -58,7 +58,7 @@ def smooth_posteriors(mesh: TriangleMesh, posteriors: FloatArray, length: float)
     One implicit step of heat flow, (M + t S) p' = M p with t = length²: the same on any meshing. On a large surface it
     is taken on cells a fraction of the length wide.
     """
-    level = Level.of(TriangleMesh(mesh.vertices / np.sqrt(mesh.area), mesh.faces))
+    level = Level.of(mesh.moved(mesh.vertices / np.sqrt(mesh.area)))
     right = level.mass @ posteriors.astype(np.float32)
     prolongation = None
     if mesh.n_vertices > LARGE:

@@ -26,7 +26,7 @@ from .mixture import CovarianceType, GaussianMixture, fit_mixture
 from .regions import FaceAdjacency, connected_regions, merge_crumbs, smooth_posteriors
 from .signature import wave_kernel_signature_of
 from .spectrum import Accuracy, SpectrumError, memory_needed
-from .surface import Surface, indicator, prepare_surface
+from .surface import Connection, Pieces, Surface, connect_alike, indicator, prepare_surface
 
 Scaling = Literal["log", "raw"]
 Progress = Callable[[str, float], None]
@@ -89,6 +89,8 @@ class PoseSegmentation:
     scaling : "log" or "raw"
         What enters the mixture: the logarithm of the signature, so that fine parts do not outweigh limbs, or the
         signature as the paper has it.
+    pieces : "joined" or "separate"
+        Loose parts tied to what they are nearest to, so that they make sense together, or each by itself.
 
     Attributes
     ----------
@@ -107,6 +109,7 @@ class PoseSegmentation:
         accuracy: Accuracy = "fast",
         random_state: int = 0,
         scaling: Scaling = "log",
+        pieces: Pieces = "joined",
     ) -> None:
         self.n_segments = n_segments
         self.covariance_type = covariance_type
@@ -115,11 +118,12 @@ class PoseSegmentation:
         self.accuracy = accuracy
         self.random_state = random_state
         self.scaling = scaling
+        self.pieces = pieces
 
     def describe(
         self,
         mesh: TriangleMesh,
-        welded: IntArray | None = None,
+        connection: Connection | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> PoseSignature:
         """Compute the signature of one pose, to pass it to the other methods in the place of the mesh.
@@ -128,8 +132,8 @@ class PoseSegmentation:
         ----------
         mesh : TriangleMesh
             The pose.
-        welded : (n,) int array, optional
-            `weld(*poses)` of all poses of the same mesh: pieces that meet in some poses only stay apart in all.
+        connection : Connection, optional
+            `connect(*poses)` of all poses of the same mesh, so that it is one surface in all of them.
         progress : callable, optional
             Called with the share of the work that is done, 0 to 1. An error that it raises ends the work.
 
@@ -143,7 +147,7 @@ class PoseSegmentation:
             If they would need more memory than is free; the message says how much.
         """
         self._check_parameters()
-        surface = prepare_surface(mesh, VERTICES_PER_PAIR * self.n_eigenpairs, welded)
+        surface = prepare_surface(mesh, VERTICES_PER_PAIR * self.n_eigenpairs, connection, self.pieces)
         n_pairs = self.n_eigenpairs + surface.n_components - 1
         signature = wave_kernel_signature_of(surface.mesh, n_pairs, self.n_energies, self.accuracy, progress)
         return PoseSignature(surface, signature, self.n_eigenpairs)
@@ -151,7 +155,7 @@ class PoseSegmentation:
     def describe_all(
         self,
         meshes: Sequence[TriangleMesh],
-        welded: Sequence[IntArray | None] | None = None,
+        connections: Sequence[Connection] | None = None,
         progress: Progress | None = None,
         names: Sequence[str] | None = None,
         workers: int | None = None,
@@ -162,8 +166,8 @@ class PoseSegmentation:
         ----------
         meshes
             The poses.
-        welded : one array or None a pose, optional
-            See `describe`.
+        connections : one a pose, optional
+            See `describe`. If not given, meshes with the same faces count as poses of one mesh.
         progress
             Called from the thread that called this.
         names : optional
@@ -176,8 +180,8 @@ class PoseSegmentation:
         ValueError, SpectrumError, MemoryError
             As `describe`; the message begins with the pose's name.
         """
-        each = list(welded) if welded is not None else [None] * len(meshes)
         called = list(names) if names is not None else [f"pose {i + 1}" for i in range(len(meshes))]
+        each = connect_alike(meshes, called, self.pieces) if connections is None else connections
         done = [0.0] * len(meshes)
         ended = threading.Event()
 
@@ -418,6 +422,7 @@ class PoseSegmentation:
             "covariance_type": ("auto", *get_args(CovarianceType)),
             "accuracy": get_args(Accuracy),
             "scaling": get_args(Scaling),
+            "pieces": get_args(Pieces),
         }
         for name, allowed in choices.items():
             if getattr(self, name) not in allowed:

@@ -1,26 +1,34 @@
 """From the mesh that an artist made to the surface that the operator lives on, and back.
 
-An artist's mesh can have a vertex several times at one place (seams of imported files) and too few vertices for
-hundreds of eigenpairs. The surface is welded and refined; `Surface` carries values back to the artist's own
-vertices and faces.
+An artist's mesh can have a vertex several times at one place (seams of imported files), spikes and holes, loose parts,
+and too few vertices for hundreds of eigenpairs. The surface is welded, repaired, refined and tied together; `Surface`
+carries values back to the artist's own vertices and faces.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from .mesh import BoolArray, FloatArray, IntArray, TriangleMesh, repeats_a_vertex
+from .mesh import BoolArray, FloatArray, IntArray, TriangleMesh, repeats_a_vertex, unique_edges
+from .pieces import ties_between_pieces
+from .repair import small_holes, without_spikes
+
+Pieces = Literal["joined", "separate"]
+"""Loose parts tied to what they are nearest to, or each with a spectrum of its own."""
 
 WELD_TOLERANCE = 1e-6
 """Distance under which two border vertices are one, as a fraction of the bounding box's diagonal."""
-LEAST_PIECE = 1e-3
-"""A loose part below this share of the area stays out of the operator: it would cost a zero mode and say nothing."""
-MOST_PIECES = 100
+LEAST_PIECE = {"joined": 1e-6, "separate": 1e-3}
+"""A loose part below this share of the area stays out of the operator. By itself it would cost a zero mode and say
+nothing."""
+MOST_PIECES = {"joined": 1000, "separate": 100}
 """Loose parts that the operator sees at most, the largest ones."""
 
 
@@ -33,12 +41,13 @@ class Surface:
     original : TriangleMesh
         The mesh as it came.
     mesh : TriangleMesh
-        The surface: no two vertices at one place along seams, every vertex in a face, fine enough.
+        The surface: no two vertices at one place along seams, every vertex in a face, no spikes, small holes closed,
+        fine enough, loose parts linked.
     vertex_of : (n,) int array
         The vertex of `mesh` that stands for each vertex of `original`; the nearest one, for vertices without a face
         and those of loose parts that are left out.
     face_of : (m',) int array
-        The face of `original` that each face of `mesh` is a piece of.
+        The face of `original` that each face of `mesh` is a piece of; -1 for those that close a hole.
     welded_faces : (m, 3) int array
         The faces of `original`, with one number for all vertices at one place: what is adjacent on the surface.
     """
@@ -71,8 +80,73 @@ class Surface:
         return at_faces
 
 
-def prepare_surface(mesh: TriangleMesh, min_vertices: int = 0, welded: IntArray | None = None) -> Surface:
-    """Weld a mesh along its seams and refine it, flat, until it has at least `min_vertices` vertices.
+@dataclass(frozen=True)
+class Connection:
+    """What is one surface, decided once for all poses of a mesh.
+
+    Attributes
+    ----------
+    welded : (n,) int array
+        For each vertex, the lowest-numbered vertex that it is joined with.
+    kept : (m,) bool array
+        Whether each face takes part in the operator.
+    ties : (t, 2) int array
+        Pairs of welded vertices that tie loose parts together.
+    """
+
+    welded: IntArray
+    kept: BoolArray
+    ties: IntArray
+
+
+def connect(*poses: TriangleMesh, rest: TriangleMesh | None = None, pieces: Pieces = "joined") -> Connection:
+    """Find out what is one surface in all poses of one mesh: what is welded, what takes part, what is tied together.
+
+    Parameters
+    ----------
+    poses
+        The same faces between vertices at other places; pieces that meet in some poses only stay apart in all.
+    rest : TriangleMesh, optional
+        The same mesh as it was modelled. Loose parts are then tied as they are there, and so in the same way for poses
+        that are not here.
+    pieces : "joined" or "separate"
+        Whether loose parts are tied together.
+
+    Raises
+    ------
+    ValueError
+        If no face is left after welding.
+    """
+    welded = weld(*poses, *([] if rest is None else [rest]))
+    first = poses[0] if rest is None else rest
+    faces = welded[first.faces]
+    kept = ~repeats_a_vertex(faces)
+    if not kept.any():
+        raise ValueError("every face of the mesh collapses when vertices at the same position are joined")
+    kept[kept] = _in_large_pieces(first, faces[kept], pieces)
+    ties = np.zeros((0, 2), dtype=np.int64)
+    if pieces == "joined":
+        ties = ties_between_pieces(faces[kept], *(pose.vertices for pose in (poses if rest is None else [rest])))
+    return Connection(welded, kept, ties)
+
+
+def connect_alike(meshes: Sequence[TriangleMesh], names: Sequence[str], pieces: Pieces = "joined") -> list[Connection]:
+    """`connect` for several meshes, those with the same faces as poses of one; errors begin with a mesh's name."""
+    found: list[Connection] = []
+    alike = [next(j for j, other in enumerate(meshes) if np.array_equal(mesh.faces, other.faces)) for mesh in meshes]
+    for i, first in enumerate(alike):
+        group = [mesh for mesh, other in zip(meshes, alike, strict=True) if other == i]
+        try:
+            found.append(connect(*group, pieces=pieces) if first == i else found[first])
+        except ValueError as error:
+            raise ValueError(f"{names[i]}: {error}") from error
+    return found
+
+
+def prepare_surface(
+    mesh: TriangleMesh, min_vertices: int = 0, connection: Connection | None = None, pieces: Pieces = "joined"
+) -> Surface:
+    """Weld a mesh along its seams, repair it, refine it, flat, to `min_vertices` vertices at least, and tie its parts.
 
     Parameters
     ----------
@@ -80,19 +154,19 @@ def prepare_surface(mesh: TriangleMesh, min_vertices: int = 0, welded: IntArray 
         The mesh as it came.
     min_vertices : int
         Each triangle is split into four as often as it takes; 0 leaves the mesh as it is.
-    welded : (n,) int array, optional
-        What `weld` gave for all poses of the mesh together, so that it is one surface in all of them.
+    connection : Connection, optional
+        What `connect` gave for all poses of the mesh, so that it is one surface in all of them.
+    pieces : "joined" or "separate"
+        For a mesh that comes alone.
 
     Raises
     ------
     ValueError
         If no face is left after welding.
     """
-    welded_faces = (weld(mesh) if welded is None else welded)[mesh.faces]
-    face_of = np.flatnonzero(~repeats_a_vertex(welded_faces))
-    if not len(face_of):
-        raise ValueError("every face of the mesh collapses when vertices at the same position are joined")
-    face_of = face_of[_in_large_pieces(mesh, welded_faces[face_of])]
+    connection = connection or connect(mesh, pieces=pieces)
+    welded_faces = connection.welded[mesh.faces]
+    face_of = np.flatnonzero(connection.kept)
     faces = welded_faces[face_of]
 
     used = np.unique(faces)
@@ -105,13 +179,18 @@ def prepare_surface(mesh: TriangleMesh, min_vertices: int = 0, welded: IntArray 
     if outside.size:
         vertex_of[outside] = cKDTree(vertices).query(mesh.vertices[outside])[1]
 
+    vertices = without_spikes(vertices, faces)
+    middles, caps = small_holes(TriangleMesh(vertices, faces))
+    vertices, faces = np.concatenate([vertices, middles]), np.concatenate([faces, caps])
+    face_of = np.append(face_of, np.full(len(caps), -1))
     while len(vertices) < min_vertices:
         vertices, faces = _split_in_four(vertices, faces)
         face_of = np.repeat(face_of, 4)
-    return Surface(mesh, TriangleMesh(vertices, faces), vertex_of, face_of, welded_faces)
+    # Refining leaves the old vertices where they were in the list.
+    return Surface(mesh, TriangleMesh(vertices, faces, compact[connection.ties]), vertex_of, face_of, welded_faces)
 
 
-def _in_large_pieces(mesh: TriangleMesh, faces: IntArray) -> BoolArray:
+def _in_large_pieces(mesh: TriangleMesh, faces: IntArray, pieces: Pieces) -> BoolArray:
     """(m',) whether each face belongs to a loose part that is large enough for the operator."""
     piece = TriangleMesh(mesh.vertices, faces).components[faces[:, 0]]
     corners = mesh.vertices[faces]
@@ -119,14 +198,15 @@ def _in_large_pieces(mesh: TriangleMesh, faces: IntArray) -> BoolArray:
     size = np.bincount(piece, weights=areas)
     largest_first = np.argsort(-size, kind="stable")
     large = np.zeros(len(size), dtype=bool)
-    large[largest_first[:MOST_PIECES]] = True
-    worth_it = size >= LEAST_PIECE * size.sum()
+    large[largest_first[: MOST_PIECES[pieces]]] = True
+    worth_it = size >= LEAST_PIECE[pieces] * size.sum()
     return (large & worth_it if worth_it.any() else large)[piece]
 
 
 def indicator(owner: IntArray, n_owners: int) -> csr_matrix:
-    """(n_owners, len(owner)) sparse matrix that sums what belongs to each owner."""
-    return csr_matrix((np.ones(len(owner)), (owner, np.arange(len(owner)))), shape=(n_owners, len(owner)))
+    """(n_owners, len(owner)) sparse matrix that sums what belongs to each owner; -1: to none."""
+    owned = np.flatnonzero(owner >= 0)
+    return csr_matrix((np.ones(len(owned)), (owner[owned], owned)), shape=(n_owners, len(owner)))
 
 
 def weld(*poses: TriangleMesh) -> IntArray:
@@ -144,8 +224,7 @@ def weld(*poses: TriangleMesh) -> IntArray:
 
 def _same_position(mesh: TriangleMesh) -> IntArray:
     """(n,) number of the group of joined vertices that each vertex is in."""
-    edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    edges, count = np.unique(edges, axis=0, return_counts=True)
+    edges, _, count = unique_edges(mesh.faces)
     tolerance = WELD_TOLERANCE * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
     length = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
     joined = [edges[length <= tolerance]]
@@ -163,8 +242,7 @@ def _same_position(mesh: TriangleMesh) -> IntArray:
 
 def _split_in_four(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
     """Split each triangle at the middles of its edges; the old vertices come first, the children of a face together."""
-    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    unique, edge_of = np.unique(edges, axis=0, return_inverse=True)
+    unique, edge_of, _ = unique_edges(faces)
     ab, bc, ca = (len(vertices) + edge_of.reshape(-1, 3)).T
     a, b, c = faces.T
     children = np.stack([a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca], axis=1).reshape(-1, 3)

@@ -1,0 +1,94 @@
+"""MakeHuman's base mesh in poses, read from a copy of its `3dobjs` and `rigs` folders."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from wks_segment.core import TriangleMesh
+from wks_segment.core.mesh import FloatArray, IntArray
+
+BEND = {
+    "upperarm01": 50, "lowerarm01": 60, "wrist": 25, "upperleg01": 40, "lowerleg01": 55, "foot": 20, "finger": 30,
+    "spine0": 8, "neck0": 10, "head": 15, "clavicle": 10, "toe": 10, "jaw": 6,
+}  # fmt: skip
+"""Bones that move, by the beginning of their names, and the largest angle in degrees about each axis."""
+BODY = "body"
+
+
+@dataclass(frozen=True)
+class MakeHuman:
+    """The base mesh, its groups of faces and its rig.
+
+    Attributes
+    ----------
+    vertices : (n, 3) array
+        In rest.
+    faces : (m, 3) int array
+        Each quadrilateral is two triangles.
+    group_of : (m,) array of str
+        The group of each triangle: "body", "joint-l-eye", …
+    bones : dict
+        Name to parent and head, parents first.
+    weights : (n, len(bones)) array
+        Rows sum to 1.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    group_of: NDArray[np.str_]
+    bones: dict[str, tuple[str | None, FloatArray]]
+    weights: FloatArray
+
+    def posed(self, seed: int, body_only: bool = True) -> TriangleMesh:
+        """The mesh with its joints turned at random by a seed; 0 is the rest pose."""
+        generator = np.random.default_rng(seed)
+        world: dict[str, FloatArray] = {}
+        for name, (parent, head) in self.bones.items():
+            most = next((angle for prefix, angle in BEND.items() if name.startswith(prefix)), 0) * (seed > 0)
+            turn = Rotation.from_euler("xyz", generator.uniform(-most, most, 3), degrees=True).as_matrix()
+            local = np.eye(4)
+            local[:3, :3], local[:3, 3] = turn, head - turn @ head
+            world[name] = world[parent] @ local if parent else local
+        blended = np.einsum("nb,bij->nij", self.weights, np.stack(list(world.values())))
+        vertices = np.einsum("nij,nj->ni", blended[:, :3, :3], self.vertices) + blended[:, :3, 3]
+        faces = self.faces[self.group_of == BODY] if body_only else self.faces
+        used, compact = np.unique(faces, return_inverse=True)
+        return TriangleMesh(vertices[used], compact.reshape(-1, 3))
+
+
+def load(folder: Path) -> MakeHuman:
+    """Read the files; OSError if one is missing."""
+    vertices, faces, group_of, group = [], [], [], ""
+    for line in (folder / "3dobjs" / "base.obj").read_text(encoding="utf-8").splitlines():
+        kind, *rest = line.split() or [""]
+        if kind == "v":
+            vertices.append([float(number) for number in rest[:3]])
+        elif kind == "g":
+            group = rest[0]
+        elif kind == "f":
+            corners = [int(corner.split("/")[0]) - 1 for corner in rest]
+            for i in range(1, len(corners) - 1):
+                faces.append((corners[0], corners[i], corners[i + 1]))
+                group_of.append(group)
+    points = np.array(vertices)
+    rig = json.loads((folder / "rigs" / "default.mhskel").read_text(encoding="utf-8"))
+    bones: dict[str, tuple[str | None, FloatArray]] = {}
+    while len(bones) < len(rig["bones"]):
+        for name, bone in rig["bones"].items():
+            if name not in bones and (not bone["parent"] or bone["parent"] in bones):
+                bones[name] = bone["parent"], points[rig["joints"][bone["head"]]].mean(axis=0)
+    place = {name: i for i, name in enumerate(bones)}
+    weights = np.zeros((len(points), len(bones)))
+    of_bones = json.loads((folder / "rigs" / "default_weights.mhw").read_text(encoding="utf-8"))["weights"]
+    for name, pairs in of_bones.items():
+        where, how_much = np.array(pairs).T
+        weights[where.astype(int), place[name]] = how_much
+    weights[weights.sum(axis=1) == 0, place["root"]] = 1
+    weights /= weights.sum(axis=1, keepdims=True)
+    return MakeHuman(points, np.array(faces), np.array(group_of), bones, weights)

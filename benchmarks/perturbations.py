@@ -1,0 +1,120 @@
+"""What scans, imports and artists do to a mesh, in strengths: noise, shot noise, holes, glued triangles, sampling.
+
+Each perturbation takes a mesh, a strength and a random generator, and gives the changed mesh together with the face of
+the clean one that each of its faces stands for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from wks_segment.core import TriangleMesh
+from wks_segment.core.mesh import FloatArray, IntArray
+
+Perturbed = tuple[TriangleMesh, IntArray]
+
+SHOT = 0.05
+"""How far shot noise throws a vertex, as a fraction of the diagonal of the bounding box."""
+HOLE = 0.03
+"""Radius of a hole, as the same fraction."""
+REACH = 0.15
+"""How far a glued triangle reaches at most, as the same fraction."""
+
+
+def noise(mesh: TriangleMesh, strength: float, generator: np.random.Generator) -> Perturbed:
+    """Every vertex moved by a normal deviate of `strength` times the mean edge length."""
+    shift = strength * _mean_edge(mesh) * generator.standard_normal(mesh.vertices.shape) / np.sqrt(3)
+    return TriangleMesh(mesh.vertices + shift, mesh.faces), np.arange(mesh.n_faces)
+
+
+def shot_noise(mesh: TriangleMesh, strength: float, generator: np.random.Generator) -> Perturbed:
+    """A share of the vertices thrown far off."""
+    chosen = generator.choice(mesh.n_vertices, max(1, round(strength * mesh.n_vertices)), replace=False)
+    direction = generator.standard_normal((len(chosen), 3))
+    vertices = mesh.vertices.copy()
+    vertices[chosen] += SHOT * _diagonal(mesh) * direction / np.linalg.norm(direction, axis=1)[:, None]
+    return TriangleMesh(vertices, mesh.faces), np.arange(mesh.n_faces)
+
+
+def holes(mesh: TriangleMesh, strength: float, generator: np.random.Generator) -> Perturbed:
+    """A number of round holes, at places drawn by area."""
+    kept = np.ones(mesh.n_faces, dtype=bool)
+    centres = mesh.vertices[mesh.faces].mean(axis=1)
+    for face in generator.choice(mesh.n_faces, round(strength), p=mesh.face_areas / mesh.area):
+        kept &= np.linalg.norm(centres - centres[face], axis=1) > HOLE * _diagonal(mesh)
+    return _of_faces(mesh, mesh.faces[kept]), np.flatnonzero(kept)
+
+
+def glued(mesh: TriangleMesh, strength: float, generator: np.random.Generator) -> Perturbed:
+    """A number of triangles between places that are near in space and not on the surface."""
+    added: list[IntArray] = []
+    near = cKDTree(mesh.vertices)
+    normals = _vertex_normals(mesh)
+    while len(added) < round(strength):
+        face = mesh.faces[generator.integers(mesh.n_faces)]
+        others = np.array(near.query_ball_point(mesh.vertices[face[0]], REACH * _diagonal(mesh)))
+        facing = others[normals[others] @ normals[face[0]] < -0.5]
+        if facing.size:
+            added.append(np.array([face[0], face[1], generator.choice(facing)]))
+    faces = np.concatenate([mesh.faces, added])
+    owner = np.concatenate([np.arange(mesh.n_faces), np.full(len(added), -1)])
+    return TriangleMesh(mesh.vertices, faces), owner
+
+
+def sampling(mesh: TriangleMesh, strength: float, generator: np.random.Generator) -> Perturbed:
+    """The mesh with 1 / `strength` of its faces, by Blender's Decimate modifier."""
+    import bpy
+
+    data = bpy.data.meshes.new("sampled")
+    data.from_pydata(mesh.vertices, [], mesh.faces)
+    obj = bpy.data.objects.new("sampled", data)
+    bpy.context.collection.objects.link(obj)
+    obj.modifiers.new("Decimate", "DECIMATE").ratio = 1 / strength
+    seen = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    seen.calc_loop_triangles()
+    vertices = np.empty(3 * len(seen.vertices), dtype=np.float32)
+    seen.vertices.foreach_get("co", vertices)
+    faces = np.empty(3 * len(seen.loop_triangles), dtype=np.int32)
+    seen.loop_triangles.foreach_get("vertices", faces)
+    bpy.data.objects.remove(obj)
+    bpy.data.meshes.remove(data)
+    coarse = TriangleMesh(vertices.reshape(-1, 3), faces.reshape(-1, 3))
+    centres = cKDTree(mesh.vertices[mesh.faces].mean(axis=1))
+    return coarse, centres.query(coarse.vertices[coarse.faces].mean(axis=1))[1]
+
+
+PERTURBATIONS: dict[str, tuple[Callable[[TriangleMesh, float, np.random.Generator], Perturbed], tuple[float, ...]]] = {
+    "noise": (noise, (0.05, 0.15, 0.25)),
+    "shot noise": (shot_noise, (0.002, 0.005, 0.01)),
+    "holes": (holes, (2, 5, 10)),
+    "glued": (glued, (3, 8, 15)),
+    "sampling": (sampling, (1.5, 2.5, 3.5)),
+}
+"""Each with its weak, middle and strongest strength."""
+
+
+def _diagonal(mesh: TriangleMesh) -> float:
+    return float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
+
+
+def _mean_edge(mesh: TriangleMesh) -> float:
+    corners = mesh.vertices[mesh.faces]
+    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
+
+
+def _vertex_normals(mesh: TriangleMesh) -> FloatArray:
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+    of_faces = np.cross(b - a, c - a)
+    normals = np.zeros((mesh.n_vertices, 3))
+    for i in range(3):
+        np.add.at(normals, mesh.faces[:, i], of_faces)
+    return normals / np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
+
+
+def _of_faces(mesh: TriangleMesh, faces: IntArray) -> TriangleMesh:
+    """Some faces of a mesh, and the vertices that they use."""
+    used, compact = np.unique(faces, return_inverse=True)
+    return TriangleMesh(mesh.vertices[used], compact.reshape(-1, 3))

@@ -1,0 +1,67 @@
+"""Loose parts that belong together share one spectrum, in the same way in every pose."""
+
+import numpy as np
+import pytest
+from shapes import icosphere, together
+
+from wks_segment.core import PoseSegmentation, TriangleMesh, connect, prepare_surface
+
+
+def ball(x, y=0.0, z=0.0, size=1.0):
+    sphere = icosphere(3)
+    return TriangleMesh(size * sphere.vertices + (x, y, z), sphere.faces)
+
+
+def tied_parts(connection, faces):
+    """The pairs of loose parts that are tied."""
+    part = TriangleMesh(np.random.default_rng(0).random((faces.max() + 1, 3)), faces).components
+    return {tuple(sorted(pair)) for pair in part[connection.ties].tolist()}
+
+
+def test_a_row_of_balls_is_tied_into_a_chain():
+    row = together(*(ball(2.1 * i) for i in (0, 2, 1, 3)))
+    assert tied_parts(connect(row), row.faces) == {(0, 2), (1, 2), (1, 3)}
+    assert prepare_surface(row).n_components == 1
+    assert prepare_surface(row, pieces="separate").n_components == 4
+
+
+def test_parts_that_meet_by_chance_in_one_pose_are_tied_where_they_stay_together():
+    # The last ball of the chain swings round to the first in one pose.
+    poses = [
+        together(ball(0), ball(2.1), ball(4.2), ball(*last)) for last in ((6.3, 0, 0), (4.2, 2.1, 0), (2.1, 2.0, 0))
+    ]
+    assert tied_parts(connect(*poses), poses[0].faces) == {(0, 1), (1, 2), (2, 3)}
+    assert tied_parts(connect(poses[2]), poses[0].faces) != {(0, 1), (1, 2), (2, 3)}
+
+
+def test_the_rest_position_decides_where_there_is_one():
+    rest, bent = (together(ball(0), ball(2.1), ball(*last)) for last in ((4.2, 0, 0), (0, 2.05, 0)))
+    ties = connect(bent, rest=rest).ties
+    np.testing.assert_array_equal(ties, connect(rest).ties)
+    assert tied_parts(connect(bent, rest=rest), rest.faces) == {(0, 1), (1, 2)}
+
+
+def test_alike_parts_in_other_places_get_other_labels_if_joined():
+    # Two balls of one size, one on the end of a long body, one on its side.
+    def figure(bend):
+        body = icosphere(4)
+        long = TriangleMesh(body.vertices * (6, 1, 1), body.faces)
+        return together(long, ball(6.5, bend, 0, 0.5), ball(0, 0, 1.5, 0.5))
+
+    poses = [figure(bend) for bend in (-0.1, 0.1)]
+    n = poses[0].n_vertices - 2 * ball(0).n_vertices
+    labels = {}
+    for pieces in ("joined", "separate"):
+        model = PoseSegmentation(6, n_eigenpairs=60, n_energies=40, pieces=pieces).fit(poses)
+        at_end, at_side = np.split(model.predict(figure(0.0))[n:], 2)
+        labels[pieces] = (at_end == at_side).mean()
+    assert labels["separate"] == pytest.approx(1, abs=0.1)
+    assert labels["joined"] < 0.5
+
+
+def test_many_parts_far_apart_are_tied_in_reasonable_time():
+    generator = np.random.default_rng(0)
+    parts = together(*(ball(*generator.uniform(0, 200, 3), 0.5) for _ in range(300)))
+    connection = connect(parts)
+    assert prepare_surface(parts, connection=connection).n_components == 1
+    assert len(tied_parts(connection, parts.faces)) == 299
