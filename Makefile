@@ -6,7 +6,7 @@ RUN := $(VENV)/bin/python
 PLATFORM ?=
 SEGMENTS ?= 6
 
-.PHONY: help demo test test-oldest lint zip clean
+.PHONY: help demo test test-oldest fuzz lint zip clean
 
 help:  ## list the commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
@@ -19,6 +19,9 @@ test: $(VENV)/.ready  ## all tests
 
 test-oldest: $(OLDEST)/.ready  ## all tests on the oldest Blender that is supported
 	$(OLDEST)/bin/python -m pytest
+
+fuzz: $(VENV)/.ready  ## thousands of broken meshes and model files, with counts (takes half an hour)
+	$(RUN) -m pytest tests -k "any_" --hypothesis-profile fuzz --timeout 7200
 
 lint: $(VENV)/.ready  ## ruff and mypy
 	$(RUN) -m ruff check .

@@ -233,8 +233,8 @@ def test_an_error_from_progress_ends_all_poses():
 
 
 def test_a_pose_that_cannot_be_described_is_named():
-    # Every edge is short enough to be none, beside a vertex far away.
-    bad = TriangleMesh([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1e9, 0, 0)], [(0, 1, 2)])
+    # A needle whose short edge is none.
+    bad = TriangleMesh([(0, 0, 0), (1, 0, 0), (1, 1e-8, 0)], [(0, 1, 2)])
     model = PoseSegmentation(n_energies=1)
     with pytest.raises(ValueError, match="n_energies"):
         model.describe_all(POSES[:1])

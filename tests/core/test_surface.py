@@ -19,6 +19,13 @@ def test_rounding_does_not_keep_a_seam_open():
     assert surface.mesh.n_vertices == icosphere(2).n_vertices
 
 
+def test_a_vertex_far_away_does_not_make_the_rest_one_place():
+    mesh = grid(4, 4)
+    for faces in (mesh.faces, np.concatenate([mesh.faces, [(0, 1, mesh.n_vertices)]])):
+        stray = TriangleMesh(np.concatenate([mesh.vertices, [(1e9, 0, 0)]]), faces)
+        assert len(np.unique(prepare_surface(stray).welded_faces)) == len(np.unique(faces))
+
+
 def test_surfaces_that_only_touch_are_not_welded():
     # Two closed spheres that share a point, as lips or a hand on the hip do: no open border, no seam.
     a = icosphere(2)
@@ -61,7 +68,7 @@ def test_a_face_that_collapses_in_welding_still_gets_a_value():
 
 def test_nothing_left_is_an_error():
     # Big enough to have an area, but its corners are one place compared with the far-away stray vertex.
-    vertices = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1e9, 0, 0)]
+    vertices = [(0, 0, 0), (1, 0, 0), (1, 1e-8, 0)]
     with pytest.raises(ValueError, match="collapses"):
         prepare_surface(TriangleMesh(vertices, [(0, 1, 2)]))
 

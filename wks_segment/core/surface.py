@@ -24,7 +24,9 @@ Pieces = Literal["joined", "separate"]
 """Loose parts tied to what they are nearest to, or each with a spectrum of its own."""
 
 WELD_TOLERANCE = 1e-6
-"""Distance under which two border vertices are one, as a fraction of the bounding box's diagonal."""
+"""Distance under which two border vertices are one, as a fraction of the bounding box's diagonal …"""
+WELD_SHARE = 0.01
+"""… and of the median edge at most: a vertex far away makes the box large."""
 LEAST_PIECE = {"joined": 1e-6, "separate": 1e-3}
 """A loose part below this share of the area stays out of the operator. By itself it would cost a zero mode and say
 nothing."""
@@ -225,8 +227,9 @@ def weld(*poses: TriangleMesh) -> IntArray:
 def _same_position(mesh: TriangleMesh) -> IntArray:
     """(n,) number of the group of joined vertices that each vertex is in."""
     edges, _, count = unique_edges(mesh.faces)
-    tolerance = WELD_TOLERANCE * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
     length = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
+    diagonal = float(np.linalg.norm(np.ptp(mesh.vertices[np.unique(edges)], axis=0)))
+    tolerance = min(WELD_TOLERANCE * diagonal, WELD_SHARE * float(np.median(length)))
     joined = [edges[length <= tolerance]]
     border = np.unique(edges[count == 1])
     if border.size:

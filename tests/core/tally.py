@@ -1,0 +1,24 @@
+"""Counts what the property-based tests tried and what came of it, for the summary of a run."""
+
+from collections import Counter, defaultdict
+
+OUTCOMES = defaultdict(Counter)
+
+
+def count(what, names, outcome):
+    """One example of a kind ("mesh"), the names of what was in it, and how it ended ("labelled")."""
+    for name in ("all", *dict.fromkeys(names)):
+        OUTCOMES[what, name][outcome] += 1
+
+
+def table():
+    """Markdown lines; none if nothing was counted."""
+    lines = []
+    for kind in dict.fromkeys(kind for kind, _ in OUTCOMES):
+        rows = {name: counter for (of, name), counter in OUTCOMES.items() if of == kind}
+        outcomes = sorted({outcome for counter in rows.values() for outcome in counter})
+        lines += ["", f"| {kind} | tried | " + " | ".join(outcomes) + " |", "|---|" + "---|" * (1 + len(outcomes))]
+        for name, counter in sorted(rows.items(), key=lambda row: (row[0] != "all", row[0])):
+            cells = (str(counter[outcome]) for outcome in outcomes)
+            lines.append(f"| {name.replace('_', ' ')} | {counter.total()} | " + " | ".join(cells) + " |")
+    return lines

@@ -1,0 +1,60 @@
+"""Whatever the mesh: labels for every face, or an error that says what is wrong. `make fuzz` tries thousands."""
+
+import numpy as np
+from defects import any_mesh
+from hypothesis import given
+from tally import count
+
+from wks_segment.core import PoseSegmentation, SpectrumError, TriangleMesh
+
+SMALL = {"n_segments": 3, "n_eigenpairs": 20, "n_energies": 20}
+
+
+def learned_from(mesh):
+    return PoseSegmentation(**SMALL).fit([mesh])
+
+
+MODEL = []
+
+
+def model_of_a_good_mesh():
+    from shapes import creature
+
+    if not MODEL:
+        MODEL.append(learned_from(creature(0.0, 3)))
+    return MODEL[0]
+
+
+@given(any_mesh())
+def test_labels_or_a_reason(drawn):
+    vertices, faces, names = drawn
+    try:
+        mesh = TriangleMesh(vertices, faces)
+        labels = model_of_a_good_mesh().segment_faces(mesh)
+        score = model_of_a_good_mesh().score(mesh)
+    except (ValueError, SpectrumError) as error:
+        assert len(str(error)) > 20, error
+        count("mesh, labelled by a model", names, "refused")
+        return
+    assert labels.shape == (len(faces),)
+    assert set(labels.tolist()) <= {0, 1, 2}
+    assert np.isfinite(score)
+    count("mesh, labelled by a model", names, "labelled")
+
+
+@given(any_mesh())
+def test_learned_or_a_reason(drawn):
+    vertices, faces, names = drawn
+    try:
+        mesh = TriangleMesh(vertices, faces)
+        model = learned_from(mesh)
+    except (ValueError, SpectrumError) as error:
+        assert len(str(error)) > 20, error
+        count("mesh, learned from", names, "refused")
+        return
+    posteriors = model.predict_proba(mesh)
+    assert posteriors.shape == (len(vertices), 3)
+    np.testing.assert_allclose(posteriors.sum(axis=1), 1, atol=1e-5)
+    assert model.segment_regions(mesh).shape == (len(faces),)
+    PoseSegmentation.from_json(model.to_json())
+    count("mesh, learned from", names, "learned")

@@ -1,0 +1,117 @@
+"""Whatever is in a model file: a model that works, or a ModelFileError. `make fuzz` tries thousands."""
+
+import json
+import time
+import tracemalloc
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from shapes import creature
+from tally import count
+
+from wks_segment.core import ModelFileError, PoseSegmentation
+
+KINDS = ("shared", "diag", "full")
+STRANGE = [
+    None, True, False, -1, 0, 1, 10**9, 10**400, 1e308, -1e308, 5e-324, float("nan"), float("inf"), "", "8", "x" * 1000,
+    [], [[]], {}, {"a": 1}, [None], [[1.0, 2.0], [3.0]], [0.0] * 10_000,
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def poses():
+    return [creature(bend, 3) for bend in (0.0, 0.4)]
+
+
+@pytest.fixture(scope="module")
+def described(poses):
+    return PoseSegmentation(3, n_eigenpairs=20, n_energies=12).describe(poses[0])
+
+
+@pytest.fixture(scope="module")
+def texts(described):
+    models = (PoseSegmentation(3, kind, n_eigenpairs=20, n_energies=12).fit([described]) for kind in KINDS)
+    return [model.to_json() for model in models]
+
+
+def places(content, path=()):
+    """The way to every value in it."""
+    yield path
+    inner = content.items() if isinstance(content, dict) else enumerate(content) if isinstance(content, list) else ()
+    for key, value in inner:
+        yield from places(value, (*path, key))
+
+
+def replaced(content, path, change):
+    for key in path[:-1]:
+        content = content[key]
+    change(content, path[-1])
+
+
+def edited(draw, text):
+    """Some values taken out or replaced by what no one expects there."""
+    content = json.loads(text)
+    for _ in range(draw(st.integers(1, 3))):
+        path = draw(st.sampled_from(list(places(content))[1:]))
+        if draw(st.booleans()):
+            value = draw(st.sampled_from(STRANGE) | st.floats() | st.integers())
+            replaced(content, path, lambda inner, key, value=value: inner.__setitem__(key, value))
+        else:
+            replaced(content, path, lambda inner, key: inner.__delitem__(key))
+    return json.dumps(content).encode()
+
+
+def truncated(draw, text):
+    return text.encode()[: draw(st.integers(0, len(text) - 1))]
+
+
+def overwritten(draw, text):
+    data = bytearray(text.encode())
+    for _ in range(draw(st.integers(1, 20))):
+        data[draw(st.integers(0, len(data) - 1))] = draw(st.integers(0, 255))
+    return bytes(data)
+
+
+def nested(draw, text):
+    opening, closing = draw(st.sampled_from([(b"[", b"]"), (b'{"a":', b"}")]))
+    depth = draw(st.integers(10, 200_000))
+    return opening * depth + b"0" + closing * depth
+
+
+def foreign(draw, text):
+    return draw(st.binary(max_size=2000))
+
+
+DAMAGES = {damage.__name__: damage for damage in (edited, truncated, overwritten, nested, foreign)}
+
+
+@given(st.data())
+def test_a_model_or_a_reason_within_a_second_and_without_much_memory(texts, described, tmp_path_factory, data):
+    name = data.draw(st.sampled_from(sorted(DAMAGES)))
+    content = DAMAGES[name](data.draw, data.draw(st.sampled_from(texts)))
+    path = tmp_path_factory.getbasetemp() / "damaged.json"
+    path.write_bytes(content)
+    tracemalloc.start()
+    start = time.process_time()
+    try:
+        model = PoseSegmentation.load(path)
+    except ModelFileError as error:
+        assert len(str(error)) > 20, error
+        model = None
+    seconds, peak = time.process_time() - start, tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert seconds < 5  # a second, but for the tracing
+    assert peak < 60e6 + 40 * len(content)
+    if model is None:
+        count("model file", [name], "refused")
+        return
+    try:
+        posteriors = model.predict_proba(described)
+    except ValueError as error:
+        assert "energies" in str(error)  # of another size than the signature at hand, if whole
+        count("model file", [name], "of another size")
+        return
+    np.testing.assert_allclose(posteriors.sum(axis=1), 1, atol=1e-5)
+    count("model file", [name], "read")
