@@ -67,7 +67,7 @@ def test_a_face_that_collapses_in_welding_still_gets_a_value():
 
 
 def test_nothing_left_is_an_error():
-    # Big enough to have an area, but its corners are one place compared with the far-away stray vertex.
+    # A needle whose short edge is none.
     vertices = [(0, 0, 0), (1, 0, 0), (1, 1e-8, 0)]
     with pytest.raises(ValueError, match="collapses"):
         prepare_surface(TriangleMesh(vertices, [(0, 1, 2)]))

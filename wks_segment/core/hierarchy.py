@@ -52,8 +52,9 @@ PROBE_STEPS = 8
 DAMPING = 0.5
 """Share of Jacobi's step in the preconditioner."""
 
-PANEL = 15_000_000
-"""Numbers in one panel of functions, 60 MB: wide enough for the solve, and most of its memory is used again."""
+PANEL = 7_500_000
+"""Numbers in one panel of functions, 30 MB: wide enough for the solve, and under the 32 MB above which memory that is
+given back goes to the system, and each new array costs a page fault every 4 KB."""
 PRODUCT_COLUMNS = 64
 """Columns in one sparse product: what a row and its neighbours need should stay in the cache."""
 CHUNK = 1024
