@@ -37,6 +37,10 @@ def body(n_vertices: int, bend: float = 0.3, irregular: bool = False) -> Triangl
     return TriangleMesh(_posed(_with_limbs(points), bend), faces)
 
 
+LEFT = 0.84
+"""Share of the vertices that `with_border` leaves."""
+
+
 def with_border(mesh: TriangleMesh) -> TriangleMesh:
     """The mesh cut open below: a sixth of its height is gone."""
     height = mesh.vertices[mesh.faces, 2].mean(axis=1)

@@ -113,7 +113,7 @@ def kinds_of(size: int, kinds: Sequence[str]) -> list[str]:
 
 def make(kind: str, size: int) -> TriangleMesh:
     """The mesh of a kind."""
-    mesh = shapes.body(size, irregular=kind == "irregular")
+    mesh = shapes.body(round(size / shapes.LEFT) if kind == "border" else size, irregular=kind == "irregular")
     changed: dict[str, Callable[[TriangleMesh], TriangleMesh]]
     changed = {"border": shapes.with_border, "pieces": shapes.with_pieces, "thin": shapes.thinned}
     return changed[kind](mesh) if kind in changed else mesh

@@ -9,6 +9,12 @@ import bpy
 
 from .errors import UserError
 
+CONVERTIBLE = {
+    "CURVE": "curve", "SURFACE": "surface", "FONT": "text", "META": "metaball", "CURVES": "hair object",
+    "POINTCLOUD": "point cloud", "VOLUME": "volume", "GREASEPENCIL": "Grease Pencil object",
+}  # fmt: skip
+"""Types of object that a mesh can be made of, and what artists call them."""
+
 
 @dataclass(frozen=True)
 class Character:
@@ -61,6 +67,16 @@ def mesh_objects(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
     """Those of the objects that hold a mesh and are not there only to draw a bone, by name."""
     meshes = sorted((obj for obj in objects if obj.type == "MESH"), key=lambda obj: obj.name)
     return [obj for obj in meshes if not _draws_a_bone(obj)]
+
+
+def why_no_mesh(objects: Iterable[bpy.types.Object]) -> str:
+    """What to do to get a mesh, if none of the objects is one."""
+    for obj in objects:
+        if obj.type in CONVERTIBLE:
+            return f'"{obj.name}" is a {CONVERTIBLE[obj.type]}: convert it first (Object > Convert > Mesh)'
+        if obj.type == "EMPTY" and obj.instance_type == "COLLECTION":
+            return f'"{obj.name}" is an instance: make it real first (Object > Apply > Make Instances Real)'
+    return "Select the mesh of a character first"
 
 
 def _draws_a_bone(obj: bpy.types.Object) -> bool:

@@ -31,6 +31,8 @@ OPTIONS = {
     "--covariance": "covariance_type",
     "--scaling": "scaling",
     "--pieces": "pieces",
+    "--limit-minutes": "limit_minutes",
+    "--limit-memory": "limit_memory",
     "--smallest-part": "min_share",
 }
 """Options that are settings: their text, limits and defaults come from the property group."""
@@ -160,6 +162,7 @@ def _segment(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     report = Report([])
     poses = _read(options, report)
     settings = _settings(options)
+    tasks.check_limits(settings.new_model(), poses, settings)
     model, described = tasks.learn(poses, settings, report, progress)
     if options.model:
         _save(model, options.model)
@@ -181,6 +184,7 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     report = Report([], n_segments=model.n_segments)
     poses = _read(options, report)
     settings = _settings(options)
+    tasks.check_limits(model, poses, settings)
     described = tasks.describe(model, poses, report, progress)
     _label(model, poses, described, settings, options, report, progress)
     settings.keep_model(model, [f"From {options.model.name}", f"{model.n_segments} segments"])

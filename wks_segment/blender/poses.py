@@ -187,7 +187,9 @@ def read_pose(context: bpy.types.Context, character: Character, name: str) -> Po
     proper = ~repeats_a_vertex(faces)
     if not (proper.any() and (polygon_of >= 0).any()):
         names = ", ".join(f'"{obj.name}"' for obj in character.objects)
-        raise UserError(f"{names} has no faces: there is no surface to find parts on")
+        nodes = any(modifier.type == "NODES" for obj in character.objects for modifier in obj.modifiers)
+        hint = "; does it consist of instances? Then add a Realize Instances node" if nodes else ""
+        raise UserError(f"{names} has no faces: there is no surface to find parts on{hint}")
     try:
         mesh = TriangleMesh(np.concatenate(vertices), faces[proper])
     except ValueError as error:
@@ -206,7 +208,7 @@ def _read_object(
         vertices = _get(mesh.vertices, "co", 3, np.float32).reshape(-1, 3)
         triangles = _get(mesh.loop_triangles, "vertices", 3, np.int32).reshape(-1, 3)
         polygon_of = _get(mesh.loop_triangles, "polygon_index", 1, np.int32)
-        if origin_name is not None:
+        if origin_name is not None and len(mesh.polygons):
             origin = mesh.attributes.get(origin_name)
             if origin is None:
                 raise UserError(
@@ -216,7 +218,9 @@ def _read_object(
         world = np.array(evaluated.matrix_world, dtype=np.float64)
     finally:
         evaluated.to_mesh_clear()
-    return vertices @ world[:3, :3].T + world[:3, 3], triangles.astype(np.int64), polygon_of.astype(np.int64)
+    with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is refused by name
+        vertices = vertices @ world[:3, :3].T + world[:3, 3]
+    return vertices, triangles.astype(np.int64), polygon_of.astype(np.int64)
 
 
 def _get(collection: bpy.types.bpy_prop_collection, name: str, width: int, dtype: type) -> NDArray[Any]:

@@ -101,6 +101,18 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         default=0.5, min=0.0, max=20.0, precision=1, subtype="PERCENTAGE",
     )  # fmt: skip
 
+    limit_minutes: FloatProperty(
+        name="Ask Above",
+        description="A job that takes longer than this many minutes, by estimate, is asked about first; without a "
+        "window it is refused",
+        default=5.0, min=0.1, max=10_000.0, soft_max=120.0, precision=1,
+    )  # fmt: skip
+    limit_memory: FloatProperty(
+        name="or Above GB",
+        description="The same for memory, in gigabytes. Zero is all that is free",
+        default=0.0, min=0.0, max=10_000.0, soft_max=128.0, precision=1,
+    )  # fmt: skip
+
     write_colors: BoolProperty(
         name="Colors", description="Write a color attribute, one flat color a face, and show it", default=True
     )

@@ -13,11 +13,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..core import Connection, PoseSegmentation, PoseSignature, SpectrumError, connect
+from ..core.memory import available_memory
 from ..core.mesh import IntArray
 from ..core.segmentation import Progress
 from . import poses as reader
 from .characters import Character, armature_of, group, mesh_objects
-from .errors import UserError
+from .errors import TooLargeError, UserError
 from .labels import write_labels
 from .poses import Pose
 from .settings import WKSSegmentSettings
@@ -106,6 +107,20 @@ def chosen_frames(scene: bpy.types.Scene, character: Character, settings: WKSSeg
             f"The frame range ends ({settings.frame_last}) before it begins ({settings.frame_first}): swap them"
         )
     return reader.evenly(settings.frame_first, settings.frame_last, settings.pose_count)
+
+
+def check_limits(model: PoseSegmentation, poses: Sequence[Pose], settings: WKSSegmentSettings) -> None:
+    """Raise TooLargeError, with the estimate, if the signatures of poses need more time or memory than is allowed."""
+    seconds, needed = model.estimate([pose.mesh for pose in poses])
+    allowed = 1e9 * settings.limit_memory or available_memory() or np.inf
+    if seconds <= 60 * settings.limit_minutes and needed <= allowed:
+        return
+    most = max(pose.mesh.n_vertices for pose in poses)
+    raise TooLargeError(
+        f"{len(poses)} poses of up to {most:,} vertices take about {seconds / 60:,.1f} minutes and {needed / 1e9:,.1f} "
+        f"GB of memory; allowed are {settings.limit_minutes:,.1f} minutes and {allowed / 1e9:,.1f} GB: raise the "
+        "limit, take fewer poses, or learn from a decimated copy and apply the model to this mesh"
+    )
 
 
 def learn(

@@ -25,7 +25,7 @@ from .mesh import FloatArray, IntArray, TriangleMesh
 from .mixture import CovarianceType, GaussianMixture, fit_mixture
 from .regions import FaceAdjacency, connected_regions, merge_crumbs, smooth_posteriors
 from .signature import wave_kernel_signature_of
-from .spectrum import Accuracy, SpectrumError, memory_needed
+from .spectrum import Accuracy, SpectrumError, memory_needed, seconds_needed
 from .surface import Connection, Pieces, Surface, connect_alike, indicator, prepare_surface
 
 Scaling = Literal["log", "raw"]
@@ -38,6 +38,8 @@ MAX_WORKERS = 4
 """Poses solved side by side at most: they share the memory's speed."""
 PROGRESS_SECONDS = 0.1
 """Time between two reports of progress."""
+BESIDE_EIGENPAIRS = 1.5
+"""Time of the whole job in that of its eigenpairs, about."""
 MOST = 0.9
 """Share of the work that is not the mixture."""
 SIGNATURE_OFFSET = 0.01
@@ -225,10 +227,24 @@ class PoseSegmentation:
         report()
         return [future.result() for future in futures]
 
+    def estimate(self, meshes: Sequence[TriangleMesh]) -> tuple[float, int]:
+        """Seconds and bytes that poses will take, roughly, before any work is done."""
+        seconds = sum(seconds_needed(self._refined(mesh), self.n_eigenpairs, self.accuracy) for mesh in meshes)
+        workers = self._workers(meshes) if meshes else 1
+        needed = sorted(memory_needed(self._refined(mesh), self.n_eigenpairs, self.accuracy) for mesh in meshes)
+        return BESIDE_EIGENPAIRS * seconds / workers, sum(needed[-workers:])
+
+    def _refined(self, mesh: TriangleMesh) -> int:
+        """Vertices of the refined surface, about."""
+        n, least = mesh.n_vertices, VERTICES_PER_PAIR * self.n_eigenpairs
+        while n < least:
+            n *= 4
+        return n
+
     def _workers(self, meshes: Sequence[TriangleMesh]) -> int:
         """Poses for which there are cores and memory at once."""
-        largest = max((mesh.n_vertices for mesh in meshes), default=0)
-        needed = memory_needed(max(largest, VERTICES_PER_PAIR * self.n_eigenpairs), self.n_eigenpairs, self.accuracy)
+        largest = max((self._refined(mesh) for mesh in meshes), default=1)
+        needed = memory_needed(largest, self.n_eigenpairs, self.accuracy)
         free = available_memory()
         by_memory = MAX_WORKERS if free is None else free // needed
         return max(1, min(MAX_WORKERS, len(meshes), os.cpu_count() or 1, by_memory))

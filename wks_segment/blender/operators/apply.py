@@ -7,11 +7,10 @@ import bpy
 from .. import poses as reader
 from .. import tasks
 from ..characters import group, mesh_objects
-from ..errors import UserError
 from . import feedback
 
 
-class WKS_SEGMENT_OT_apply(bpy.types.Operator):
+class WKS_SEGMENT_OT_apply(feedback.AsksFirst, bpy.types.Operator):
     """Find the learned parts in the selected objects as they are now: other poses, levels of detail or characters"""
 
     bl_idname = "wks_segment.apply"
@@ -25,20 +24,18 @@ class WKS_SEGMENT_OT_apply(bpy.types.Operator):
             return False
         return feedback.in_object_mode(cls, context) and feedback.has_selected_mesh(cls, context)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def work(self, context: bpy.types.Context) -> set[str]:
+        """Read, label and write; UserError if it cannot be done."""
         settings = context.scene.wks_segment
         report = tasks.Report([])
-        try:
-            with feedback.cursor_progress(context) as progress:
-                model = tasks.stored_model(settings)
-                with report.stage("read"):
-                    report.poses = reader.read_objects(context, group(mesh_objects(context.selected_objects)))
-                described = tasks.describe(model, report.poses, report, progress)
-                labels = tasks.label(model, report.poses, described, settings, report, progress)
-                tasks.write(labels, settings, report)
-        except UserError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        with feedback.cursor_progress(context) as progress:
+            model = tasks.stored_model(settings)
+            with report.stage("read"):
+                report.poses = reader.read_objects(context, group(mesh_objects(context.selected_objects)))
+            self.check_limits(context, model, report.poses)
+            described = tasks.describe(model, report.poses, report, progress)
+            labels = tasks.label(model, report.poses, described, settings, report, progress)
+            tasks.write(labels, settings, report)
         if settings.write_colors:
             feedback.show_colors(context)
         return feedback.finish(self, "Applied", report)
