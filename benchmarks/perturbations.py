@@ -1,4 +1,4 @@
-"""What scans, imports and artists do to a mesh, in strengths: noise, shot noise, holes, glued triangles, sampling.
+"""What scans, imports and artists do to a mesh, in strengths: noise, holes, glue, sampling and so on.
 
 Each perturbation takes a mesh, a strength and a random generator, and gives the changed mesh together with the face of
 the clean one that each of its faces stands for.
@@ -12,7 +12,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from wks_segment.core import TriangleMesh
-from wks_segment.core.mesh import FloatArray, IntArray
+from wks_segment.core.mesh import FloatArray, IntArray, unique_edges
+from wks_segment.core.refine import cut
 
 Perturbed = tuple[TriangleMesh, IntArray]
 
@@ -86,12 +87,31 @@ def sampling(mesh: TriangleMesh, strength: float, generator: np.random.Generator
     return coarse, centres.query(coarse.vertices[coarse.faces].mean(axis=1))[1]
 
 
+def finer(mesh: TriangleMesh, strength: float, generator: np.random.Generator) -> Perturbed:
+    """Half of the mesh, on one side of a random plane through its middle, split into four, `strength` times."""
+    vertices, faces, owner = mesh.vertices, mesh.faces, np.arange(mesh.n_faces)
+    side = mesh.vertices @ generator.standard_normal(3)
+    side -= np.median(side)
+    for _ in range(round(strength)):
+        edges, which, _ = unique_edges(faces)
+        split = np.zeros(len(edges), dtype=bool)
+        split[which.reshape(-1, 3)[side[faces].mean(axis=1) > 0].ravel()] = True
+        middle = np.full(len(edges), -1)
+        middle[split] = len(vertices) + np.arange(split.sum())
+        vertices = np.concatenate([vertices, vertices[edges[split]].mean(axis=1)])
+        side = np.concatenate([side, side[edges[split]].mean(axis=1)])
+        faces, piece_of = cut(faces, middle[which.reshape(-1, 3)], vertices)
+        owner = owner[piece_of]
+    return TriangleMesh(vertices, faces), owner
+
+
 PERTURBATIONS: dict[str, tuple[Callable[[TriangleMesh, float, np.random.Generator], Perturbed], tuple[float, ...]]] = {
     "noise": (noise, (0.05, 0.15, 0.25)),
     "shot noise": (shot_noise, (0.002, 0.005, 0.01)),
     "holes": (holes, (2, 5, 10)),
     "glued": (glued, (3, 8, 15)),
     "sampling": (sampling, (1.5, 2.5, 3.5)),
+    "finer on one side": (finer, (1, 2, 3)),
 }
 """Each with its weak, middle and strongest strength."""
 

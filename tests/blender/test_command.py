@@ -17,7 +17,7 @@ from wks_segment.core import PoseSegmentation
 
 ROOT = Path(__file__).resolve().parents[2]
 QUICK = ("--eigenpairs", 30, "--energies", 40, "--segments", 4)
-BENDS = (0.0, 0.4, 0.8)
+BENDS = (0.0, 0.3, 0.6)
 
 
 def empty():

@@ -25,7 +25,7 @@ from wks_segment.core import PoseSegmentation, hierarchy, spectrum
 
 pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
-BENDS = (0.0, 0.4, 0.8)
+BENDS = (0.0, 0.3, 0.6)
 UNSEEN = 0.6
 
 

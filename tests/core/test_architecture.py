@@ -14,6 +14,7 @@ CHAIN = [
     "mesh",
     "repair",
     "pieces",
+    "refine",
     "surface",
     "laplacian",
     "factor",

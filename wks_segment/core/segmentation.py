@@ -32,7 +32,7 @@ Scaling = Literal["log", "raw"]
 Progress = Callable[[str, float], None]
 """Called with the stage and the fraction of the whole that is done, 0 to 1. An error that it raises ends the work."""
 
-VERTICES_PER_PAIR = 10
+VERTICES_PER_PAIR = 15
 """A surface is refined until it has this many vertices for each eigenpair: about five to the shortest wavelength."""
 MAX_WORKERS = 4
 """Poses solved side by side at most: they share the memory's speed."""

@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 
 from .mesh import BoolArray, FloatArray, IntArray, TriangleMesh, repeats_a_vertex, unique_edges
 from .pieces import ties_between_pieces
+from .refine import split_long_edges
 from .repair import small_holes, without_spikes
 
 Pieces = Literal["joined", "separate"]
@@ -30,6 +31,10 @@ WELD_SHARE = 0.01
 LEAST_PIECE = {"joined": 1e-6, "separate": 1e-3}
 """A loose part below this share of the area stays out of the operator. By itself it would cost a zero mode and say
 nothing."""
+EDGE = 1.4
+"""Longest edge, in units of the square root of the area of a vertex: even triangles have edges of 1.07."""
+MOST_NEW = 4
+"""Vertices that refining adds at most, in units of those asked for: thin triangles would need very many."""
 MOST_PIECES = {"joined": 1000, "separate": 100}
 """Loose parts that the operator sees at most, the largest ones."""
 
@@ -185,9 +190,11 @@ def prepare_surface(
     middles, caps = small_holes(TriangleMesh(vertices, faces))
     vertices, faces = np.concatenate([vertices, middles]), np.concatenate([faces, caps])
     face_of = np.append(face_of, np.full(len(caps), -1))
-    while len(vertices) < min_vertices:
-        vertices, faces = _split_in_four(vertices, faces)
-        face_of = np.repeat(face_of, 4)
+    if min_vertices:
+        area = TriangleMesh(vertices, faces).area
+        longest = EDGE * np.sqrt(area / min_vertices)
+        vertices, faces, piece_of = split_long_edges(vertices, faces, longest, len(vertices) + MOST_NEW * min_vertices)
+        face_of = face_of[piece_of]
     # Refining leaves the old vertices where they were in the list.
     return Surface(mesh, TriangleMesh(vertices, faces, compact[connection.ties]), vertex_of, face_of, welded_faces)
 
@@ -241,12 +248,3 @@ def _same_position(mesh: TriangleMesh) -> IntArray:
     a, b = np.concatenate(joined).T
     graph = coo_matrix((np.ones(len(a), dtype=np.int8), (a, b)), shape=(mesh.n_vertices,) * 2)
     return connected_components(graph, directed=False)[1].astype(np.int64)
-
-
-def _split_in_four(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
-    """Split each triangle at the middles of its edges; the old vertices come first, the children of a face together."""
-    unique, edge_of, _ = unique_edges(faces)
-    ab, bc, ca = (len(vertices) + edge_of.reshape(-1, 3)).T
-    a, b, c = faces.T
-    children = np.stack([a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca], axis=1).reshape(-1, 3)
-    return np.concatenate([vertices, vertices[unique].mean(axis=1)]), children

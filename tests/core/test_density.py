@@ -1,0 +1,72 @@
+"""How finely a region is meshed must not change its labels."""
+
+import numpy as np
+import pytest
+from shapes import creature
+
+from wks_segment.core import PoseSegmentation, TriangleMesh
+
+SMALL = {"n_segments": 3, "n_eigenpairs": 150, "n_energies": 60}
+BENDS = (0.0, 0.4, 0.8)
+
+
+def finer_on_one_side(mesh, axis=0, rounds=1):
+    """Each triangle on one side split into four, those beside them so that no vertex lies on an edge.
+
+    Returns the mesh and, for each of its faces, the one that it is a piece of.
+    """
+    owner = np.arange(mesh.n_faces)
+    vertices, faces = mesh.vertices, mesh.faces
+    for _ in range(rounds):
+        chosen = vertices[faces].mean(axis=1)[:, axis] > 0
+        edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        unique, which = np.unique(edges, axis=0, return_inverse=True)
+        which = which.reshape(-1, 3)
+        split = np.zeros(len(unique), dtype=bool)
+        split[which[chosen].ravel()] = True
+        middle = np.full(len(unique), -1)
+        middle[split] = len(vertices) + np.arange(split.sum())
+        vertices = np.concatenate([vertices, vertices[unique[split]].mean(axis=1)])
+        new, of = [], []
+        for i, ((a, b, c), (ab, bc, ca)) in enumerate(zip(faces.tolist(), middle[which].tolist(), strict=True)):
+            corners = [v for v in (a, ab, b, bc, c, ca) if v >= 0]
+            if len(corners) == 6:
+                pieces = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+            else:
+                start = next((k for k, v in enumerate(corners) if v in (ab, bc, ca) and v >= 0), 0)
+                fan = corners[start:] + corners[:start]
+                pieces = [(fan[0], fan[k], fan[k + 1]) for k in range(1, len(fan) - 1)]
+            new += pieces
+            of += [owner[i]] * len(pieces)
+        faces, owner = np.array(new), np.array(of)
+    return TriangleMesh(vertices, faces), owner
+
+
+@pytest.fixture(scope="module")
+def model():
+    return PoseSegmentation(**SMALL).fit([creature(bend, 4) for bend in BENDS])
+
+
+def share_alike(found, owner, expected, mesh):
+    return np.average(found == expected[owner], weights=mesh.face_areas)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("rounds", [1, 2])
+def test_labels_of_a_mesh_that_is_finer_on_one_side(model, axis, rounds):
+    mesh = creature(0.25, 4)
+    expected = model.segment_faces(mesh)
+    finer, owner = finer_on_one_side(mesh, axis, rounds)
+    assert finer.area == pytest.approx(mesh.area)
+    assert share_alike(model.segment_faces(finer), owner, expected, finer) > 0.98
+
+
+def test_what_is_learned_from_meshes_that_are_finer_on_one_side(model):
+    mesh = creature(0.25, 4)
+    uneven = PoseSegmentation(**SMALL).fit([finer_on_one_side(creature(bend, 4), rounds=2)[0] for bend in BENDS])
+    labels, expected = uneven.segment_faces(mesh), model.segment_faces(mesh)
+    # Numbers may differ: each part is compared with the one that it covers most.
+    same = sum(
+        max(mesh.face_areas[(labels == k) & (expected == j)].sum() for j in range(3)) for k in range(3)
+    ) / mesh.area  # fmt: skip
+    assert same > 0.98
