@@ -235,9 +235,10 @@ def _polish(
         length = np.where((worst_growth > 1) & (i % 2 == 1), 2 / (worst_growth + 3), 1)
         better = vectors[:, off]
         better -= factor.solve(operator @ better - better * values[off]) * length
-        better = _orthonormal_to(np.hstack([zero_modes, vectors[:, ~off]]), better)
-        values[off], rotation = eigh(better.T @ (operator @ better))
-        vectors[:, off] = better @ rotation
+        vectors[:, off] = _orthonormal_to(np.hstack([zero_modes, vectors[:, ~off]]), better)
+        # Over all: what is left of the residual of a high function can be large along a low one.
+        values[:], rotation = eigh(vectors.T @ _times(operator, vectors))
+        vectors[:] = vectors @ rotation
 
 
 def _orthonormal_to(basis: FloatArray, block: FloatArray) -> FloatArray:
@@ -273,6 +274,15 @@ def _residuals(operator: csr_matrix, values: FloatArray, vectors: FloatArray) ->
         image -= vectors[:, columns] * values[columns]
         residuals[columns] = np.linalg.norm(image, axis=0)
     return np.asarray(np.maximum(residuals - rounding, 0) / np.maximum(values, 1))
+
+
+def _times(operator: csr_matrix, vectors: FloatArray) -> FloatArray:
+    """operator @ vectors, in blocks of columns."""
+    image = np.empty_like(vectors)
+    for start in range(0, vectors.shape[1], COLUMNS):
+        columns = slice(start, start + COLUMNS)
+        image[:, columns] = operator @ np.ascontiguousarray(vectors[:, columns])
+    return image
 
 
 def check(operator: csr_matrix, values: FloatArray, vectors: FloatArray) -> None:
