@@ -1,9 +1,15 @@
 import json
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 from shapes import creature
 
-from wks_segment.core import ModelFileError, PoseSegmentation
+from wks_segment.core import ModelFileError, PoseSegmentation, model_file
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -68,6 +74,28 @@ def test_a_huge_file_is_refused_before_it_is_read(tmp_path):
         file.truncate(2**40)  # a sparse file: a terabyte by its size, nothing on the disk
     with pytest.raises(ModelFileError, match="too large"):
         PoseSegmentation.load(path)
+
+
+def test_a_model_too_large_to_be_read_again_is_not_written(tmp_path, text, monkeypatch):
+    monkeypatch.setattr(model_file, "MAX_BYTES", 1000)
+    with pytest.raises(ValueError, match="take fewer segments"):
+        PoseSegmentation.from_json(text).save(tmp_path / "model.json")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
+def test_a_process_killed_while_it_writes_leaves_the_old_file(tmp_path, text):
+    path, source = tmp_path / "model.json", tmp_path / "text.json"
+    path.write_text("precious")
+    source.write_text(text)
+    code = (
+        "import os, sys; from wks_segment.core import PoseSegmentation; "
+        "os.replace = lambda *_: os.kill(os.getpid(), 9); "
+        "PoseSegmentation.load(sys.argv[1]).save(sys.argv[2])"
+    )
+    done = subprocess.run([sys.executable, "-c", code, source, path], cwd=ROOT, timeout=120, check=False)
+    assert done.returncode == -9
+    assert path.read_text() == "precious"
 
 
 def test_a_failed_save_leaves_the_old_file(tmp_path, text, monkeypatch):

@@ -304,6 +304,8 @@ def _label(
 def _save(model: PoseSegmentation, path: Path) -> None:
     try:
         model.save(path)
+    except ValueError as error:
+        raise UserError(f"{path}: {error}") from error
     except OSError as error:
         raise UserError(f"{path}: the model could not be written: {error.strerror or error}") from error
 

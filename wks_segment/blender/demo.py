@@ -88,6 +88,8 @@ def run(
         render_poses([Tile(*of_pose) for of_pose in zip(poses, own, captions, strict=True)], paths["picture"])
     try:
         model.save(paths["model"])
+    except ValueError as error:
+        raise UserError(f"{paths['model']}: {error}") from error
     except OSError as error:
         raise UserError(f"{paths['model']}: the model could not be written: {error.strerror or error}") from error
     settings.keep_model(model, [f"From {character.name}", *report.facts[:3]])

@@ -21,8 +21,9 @@ PARAMETERS = (
 )  # fmt: skip
 LARGEST = {"n_segments": 1000, "n_eigenpairs": 5000, "n_energies": 1000}
 """A file that asks for more would have a mesh refined until the memory is full."""
-MAX_BYTES = 256 * 2**20
-"""A file above this is no model: 64 segments with full covariances of 200 energies take 60 MB."""
+MAX_BYTES = 20 * 2**20
+"""A file above this is not read, nor written: what is in there could take longer than a second. 64 segments with
+diagonal covariances take 300 kB, 8 with full ones 2 MB."""
 
 
 class ModelFileError(ValueError):
@@ -82,7 +83,20 @@ def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], Covariance
 
 
 def write(path: str | PathLike[str], text: str) -> None:
-    """Write text to a file so that a failure half-way leaves an older file as it was."""
+    """Write text to a file so that a failure half-way leaves an older file as it was.
+
+    Raises
+    ------
+    ValueError
+        If the model is so large that `read` would refuse it.
+    OSError
+        If the file cannot be written.
+    """
+    if len(text) > MAX_BYTES:
+        raise ValueError(
+            f"the model takes {len(text) / 2**20:.0f} MB, more than the {MAX_BYTES / 2**20:.0f} MB that are read again: "
+            "take fewer segments or energies, or another covariance than full"
+        )
     target = Path(path).resolve()
     if target.exists() and not os.access(target, os.W_OK):
         raise PermissionError(f"{target} may not be written to")

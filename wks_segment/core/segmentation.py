@@ -387,7 +387,7 @@ class PoseSegmentation:
         Raises
         ------
         ValueError
-            If the model is not fitted.
+            If the model is not fitted, or too large to be read again.
         OSError
             If the file cannot be written.
         """

@@ -35,7 +35,7 @@ class WKS_SEGMENT_OT_save_model(bpy.types.Operator, ExportHelper):
         try:
             tasks.stored_model(context.scene.wks_segment)
             model_file.write(path, context.scene.wks_segment.model)
-        except (UserError, OSError) as error:
+        except (UserError, ValueError, OSError) as error:
             self.report({"ERROR"}, f"The model was not saved: {error}")
             return {"CANCELLED"}
         self.report({"INFO"}, f"Saved the model to {path}")
