@@ -94,7 +94,7 @@ def write(path: str | PathLike[str], text: str) -> None:
     """
     if len(text) > MAX_BYTES:
         raise ValueError(
-            f"the model takes {len(text) / 2**20:.0f} MB, more than the {MAX_BYTES / 2**20:.0f} MB that are read again: "
+            f"the model takes {len(text) / 2**20:.0f} MB, and only {MAX_BYTES / 2**20:.0f} MB would be read again: "
             "take fewer segments or energies, or another covariance than full"
         )
     target = Path(path).resolve()
