@@ -279,14 +279,17 @@ def _change_ahead(
 
 
 def panels(n_rows: int, n_columns: int) -> Iterator[slice]:
-    """Columns that are worked on at once."""
-    width = max(PANEL // n_rows, PRODUCT_COLUMNS)
-    for start in range(0, n_columns, width):
-        yield slice(start, min(start + width, n_columns))
+    """Columns that are worked on at once, in panels of nearly one width."""
+    width = max(PANEL // n_rows // PRODUCT_COLUMNS, 1) * PRODUCT_COLUMNS
+    count = -(-n_columns // width)
+    for i in range(count):
+        yield slice(i * n_columns // count, (i + 1) * n_columns // count)
 
 
 def times(matrix: csr_matrix, vectors: FloatArray) -> FloatArray:
     """matrix @ vectors for a sparse matrix, in blocks of columns that suit the cache."""
+    if matrix.nnz == matrix.shape[0] and (diagonal := matrix.diagonal()).all():  # as masses of vertices are
+        return np.asarray(vectors * diagonal[:, None])
     if vectors.shape[1] <= PRODUCT_COLUMNS:
         return np.asarray(matrix @ np.ascontiguousarray(vectors))
     result: FloatArray = np.empty((matrix.shape[0], vectors.shape[1]), dtype=np.float32)
