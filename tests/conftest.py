@@ -11,7 +11,7 @@ import tally
 
 EASY = {"deadline": None, "suppress_health_check": list(HealthCheck), "database": None}
 settings.register_profile("default", max_examples=40, derandomize=True, **EASY)
-settings.register_profile("fuzz", max_examples=1100, print_blob=True, **EASY)
+settings.register_profile("fuzz", max_examples=1000, print_blob=True, **EASY)
 settings.load_profile("default")
 
 
