@@ -3,6 +3,7 @@
 import json
 import time
 import tracemalloc
+from copy import deepcopy
 
 import numpy as np
 import pytest
@@ -56,7 +57,7 @@ def edited(draw, text):
     for _ in range(draw(st.integers(1, 3))):
         path = draw(st.sampled_from(list(places(content))[1:]))
         if draw(st.booleans()):
-            value = draw(st.sampled_from(STRANGE) | st.floats() | st.integers())
+            value = deepcopy(draw(st.sampled_from(STRANGE) | st.floats() | st.integers()))
             replaced(content, path, lambda inner, key, value=value: inner.__setitem__(key, value))
         else:
             replaced(content, path, lambda inner, key: inner.__delitem__(key))

@@ -69,7 +69,9 @@ class GaussianMixture:
     def posteriors(self, samples: FloatArray) -> FloatArray:
         """(n, K) probability of each component given each of the (n, d) samples; rows sum to 1."""
         logs = self.log_densities(samples)
-        return np.asarray(np.exp(logs - logsumexp(logs, axis=1, keepdims=True)))
+        # Divided by their sum, not by e to its logarithm: of a large one the digits behind the point are lost.
+        shares = np.exp(logs - logs.max(axis=1, keepdims=True))
+        return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 
     def log_likelihoods(self, samples: FloatArray) -> FloatArray:
         """(n,) log density of the whole mixture at (n, d) samples."""

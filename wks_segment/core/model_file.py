@@ -21,6 +21,9 @@ PARAMETERS = (
 )  # fmt: skip
 LARGEST = {"n_segments": 1000, "n_eigenpairs": 5000, "n_energies": 1000}
 """A file that asks for more would have a mesh refined until the memory is full."""
+LEAST, MOST = 1e-6, 1e6
+"""Sizes of numbers in a model: spreads lie between them, squares of both bound variances. Beyond, single precision would
+lose a signature's digits, or overflow."""
 MAX_BYTES = 20 * 2**20
 """A file above this is not read, nor written: what is in there could take longer than a second. 64 segments with
 diagonal covariances take 300 kB, 8 with full ones 2 MB."""
@@ -71,6 +74,14 @@ def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], Covariance
             "centre": (d,), "spread": (d,), "weights": (k,), "means": (k, d), "covariances": shapes[covariance_type],
         }.items()
     }  # fmt: skip
+    for name, array in arrays.items():
+        if np.abs(array).max(initial=0) > (MOST**2 if name == "covariances" else MOST):
+            raise ModelFileError(f"the model is damaged: {name} has a number of {np.abs(array).max():.3g}, too large")
+    variances = arrays["covariances"]
+    if covariance_type in ("tied", "full"):
+        variances = np.diagonal(variances, axis1=-2, axis2=-1)
+    if arrays["spread"].min() < LEAST or variances.min() < LEAST**2:
+        raise ModelFileError("the model is damaged: a spread or a variance is not positive, or far too small")
     if covariance_type in ("tied", "full"):
         positive = bool((np.linalg.eigvalsh(arrays["covariances"]) > 0).all())
     else:

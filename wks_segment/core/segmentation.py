@@ -291,7 +291,7 @@ class PoseSegmentation:
             shares = np.full(MAX_SAMPLES, 1 / MAX_SAMPLES)
         samples = self._scaled(np.concatenate(signatures)).astype(np.float64)
         self.centre_ = shares @ samples
-        self.spread_ = np.sqrt(shares @ (samples - self.centre_) ** 2) + np.finfo(float).eps
+        self.spread_ = np.maximum(np.sqrt(shares @ (samples - self.centre_) ** 2), model_file.LEAST)
         self.mixture_ = fit_mixture(
             (samples - self.centre_) / self.spread_,
             shares,
