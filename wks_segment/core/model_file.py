@@ -22,7 +22,7 @@ PARAMETERS = (
 LARGEST = {"n_segments": 1000, "n_eigenpairs": 5000, "n_energies": 1000}
 """A file that asks for more would have a mesh refined until the memory is full."""
 LEAST, MOST = 1e-6, 1e6
-"""Sizes of numbers in a model: spreads lie between them, squares of both bound variances. Beyond, single precision would
+"""Sizes of numbers in a model: spreads lie between them, their squares bound variances. Beyond, single precision would
 lose a signature's digits, or overflow."""
 MAX_BYTES = 20 * 2**20
 """A file above this is not read, nor written: what is in there could take longer than a second. 64 segments with
