@@ -610,3 +610,20 @@ def test_process_that_is_interrupted_ends_at_once_and_does_not_crash(folder):
     running.send_signal(signal.SIGINT)
     done = ended(running)
     assert done.code in (1, 128 + signal.SIGINT, -signal.SIGINT), done
+
+
+# Limits
+
+
+@pytest.mark.parametrize("name", ["segment", "apply", "demo"])
+def test_a_job_above_the_limit_is_refused_and_the_limit_can_be_raised(command, folder, tmp_path, name):
+    model = tmp_path / "model.json"
+    assert command("learn", folder / "pose_0.blend", *QUICK, "--model", model).code == 0
+    arguments = {
+        "segment": ("segment", folder / "pose_0.blend", *QUICK, "--output", tmp_path / "out.blend"),
+        "apply": ("apply", folder / "pose_0.blend", "--model", model, "--output", tmp_path / "out.blend"),
+        "demo": ("demo", "--input", folder / "walker.blend", "--folder", tmp_path, *QUICK),
+    }[name]
+    refused = command(*arguments, "--limit-memory", "0.001")
+    assert (refused.code, "0.0 GB: raise the limit" in refused.err) == (1, True)
+    assert command(*arguments, "--limit-memory", "64", "--limit-minutes", "60").code == 0

@@ -76,7 +76,8 @@ def _parser() -> argparse.ArgumentParser:
     apply = commands.add_parser("apply", help="find the parts of a model in files")
     _add_poses(apply)
     apply.add_argument("--model", type=Path, required=True, help="a model that learn or segment wrote")
-    _add_setting(apply, "--smallest-part", "min_share")
+    for option in ("--smallest-part", "--limit-minutes", "--limit-memory"):
+        _add_setting(apply, option, OPTIONS[option])
     _add_outputs(apply)
     apply.set_defaults(run=_apply)
 

@@ -67,6 +67,7 @@ def run(
     report.poses = poses
     training = [pose for pose, known in zip(poses, learned, strict=True) if known]
     others = [pose for pose, known in zip(poses, learned, strict=True) if not known]
+    tasks.check_limits(settings.new_model(), poses, settings)
     model, described = tasks.learn(training, settings, report, lambda stage, done: progress(stage, 0.5 * done))
     together = tasks.label(model, training, described, settings, report, lambda stage, done: progress(stage, 0.5))
     tasks.write(together, settings, report)

@@ -16,7 +16,7 @@ CONTACT = 0.01
 """Parts are tied where they are no further apart than where they are nearest, and this much more, in units of the
 square root of the area …"""
 LEAST_CONTACT = 0.1
-"""… but over this share of the smaller part's vertices at least: a single link would be a hinge of no width."""
+"""… but over this share of the newer part's vertices at least: a single link would be a hinge of no width."""
 
 
 def ties_between_pieces(faces: IntArray, *poses: FloatArray) -> IntArray:

@@ -160,7 +160,7 @@ def prepare_surface(
     mesh : TriangleMesh
         The mesh as it came.
     min_vertices : int
-        Each triangle is split into four as often as it takes; 0 leaves the mesh as it is.
+        Edges are halved until all are as short as those of so many evenly spread vertices; 0 leaves them as they are.
     connection : Connection, optional
         What `connect` gave for all poses of the mesh, so that it is one surface in all of them.
     pieces : "joined" or "separate"
