@@ -79,9 +79,7 @@ class TriangleMesh:
     @cached_property
     def components(self) -> IntArray:
         """(n,) which part each vertex belongs to, numbered 0, 1, …; a vertex without face or link is one by itself."""
-        a, b = np.concatenate([self.faces[:, [0, 1]], self.faces[:, [1, 2]], self.links]).T
-        graph = coo_matrix((np.ones(len(a), dtype=np.int8), (a, b)), shape=(self.n_vertices,) * 2)
-        return connected_components(graph, directed=False)[1].astype(np.int64)
+        return components_of(self.faces, self.n_vertices, self.links)
 
     def __repr__(self) -> str:
         return f"TriangleMesh({self.n_vertices} vertices, {self.n_faces} faces)"
@@ -126,6 +124,20 @@ def _checked_links(links: ArrayLike | None, n_vertices: int) -> IntArray:
     if ((array < 0) | (array >= n_vertices)).any():
         raise ValueError(f"a link points to a vertex that does not exist; the mesh has {n_vertices} vertices")
     return array
+
+
+def components_of(faces: IntArray, n_vertices: int, links: IntArray | None = None) -> IntArray:
+    """(n,) which part each vertex belongs to, numbered 0, 1, …"""
+    pairs = [faces[:, [0, 1]], faces[:, [1, 2]], *([] if links is None else [links])]
+    a, b = np.concatenate(pairs).T
+    graph = coo_matrix((np.ones(len(a), dtype=np.int8), (a, b)), shape=(n_vertices,) * 2)
+    return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """(m, 3) lengths of the edges ab, bc and ca of each triangle."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    return np.stack([np.sqrt(np.einsum("ij,ij->i", d, d)) for d in (b - a, c - b, a - c)], axis=1)
 
 
 def edges_of(faces: IntArray) -> IntArray:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .mesh import FloatArray, IntArray, TriangleMesh
+from .mesh import FloatArray, IntArray, TriangleMesh, components_of
 
 CONTACT = 0.01
 """Parts are tied where they are no further apart than where they are nearest, and this much more, in units of the
@@ -31,13 +31,14 @@ def ties_between_pieces(faces: IntArray, *poses: FloatArray) -> IntArray:
         Positions of the vertices in each pose. Distances are root mean squares over the poses, so that parts are tied
         at their joints and not where they meet by chance.
     """
+    label = components_of(faces, len(poses[0]))
+    if (label[faces[:, 0]] == label[faces[0, 0]]).all():
+        return np.zeros((0, 2), dtype=np.int64)
     surface = TriangleMesh(poses[0], faces)
     used = np.unique(faces)
     piece = np.full(surface.n_vertices, -1)
-    piece[used] = np.unique(surface.components[used], return_inverse=True)[1]
+    piece[used] = np.unique(label[used], return_inverse=True)[1]
     count = int(piece.max()) + 1
-    if count == 1:
-        return np.zeros((0, 2), dtype=np.int64)
     # A distance in this space is the root mean square of those in the poses.
     places = np.concatenate(poses, axis=1) / np.sqrt(len(poses))
     order = np.argsort(piece, kind="stable")

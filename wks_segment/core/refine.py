@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .mesh import FloatArray, IntArray, unique_edges
+from .mesh import FloatArray, IntArray, edge_lengths, unique_edges
 
 MAX_ROUNDS = 20
 """Rounds of halving: a millionfold."""
@@ -25,9 +25,11 @@ def split_long_edges(
     """
     owner = np.arange(len(faces))
     for _ in range(MAX_ROUNDS):
+        if edge_lengths(vertices, faces).max() <= longest:
+            break
         edges, which, _ = unique_edges(faces)
         too_long = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1) > longest
-        if not too_long.any() or len(vertices) + too_long.sum() > most_vertices:
+        if len(vertices) + too_long.sum() > most_vertices:
             break
         middle = np.full(len(edges), -1)
         middle[too_long] = len(vertices) + np.arange(too_long.sum())

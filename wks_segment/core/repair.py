@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, diags
 from scipy.sparse.csgraph import connected_components
 
-from .mesh import FloatArray, IntArray, TriangleMesh, edges_of, unique_edges
+from .mesh import FloatArray, IntArray, TriangleMesh, edge_lengths, edges_of, unique_edges
 
 SPIKE_HEIGHT = 3.0
 """Distance of a spike from the middle of its neighbours, at least, in units of the mesh's median edge …"""
@@ -27,8 +27,18 @@ def without_spikes(vertices: FloatArray, faces: IntArray) -> FloatArray:
     Shot noise: a single vertex thrown far off makes long slivers, which add area and pin the eigenfunctions. The tip of
     a horn or a finger is not meant: it stands on edges as long as itself, or is no longer than the other edges.
     """
-    a, b = edges_of(faces).T
     n = len(vertices)
+    lengths = edge_lengths(vertices, faces)
+    typical = np.median(lengths)
+    # No vertex is further from the middle of its neighbours than from the furthest of them: most need no second look.
+    long = lengths > SPIKE_HEIGHT * typical
+    suspect = np.zeros(n, dtype=bool)
+    for i in range(3):
+        suspect[faces[long[:, i]][:, [i, (i + 1) % 3]]] = True
+    faces = faces[suspect[faces].any(axis=1)]
+    if not len(faces):
+        return vertices
+    a, b = edges_of(faces).T
     adjacency = csr_matrix((np.ones(2 * len(a)), (np.append(a, b), np.append(b, a))), shape=(n, n))
     around = np.bincount(faces.ravel(), minlength=n)
     spiky = np.zeros(n, dtype=bool)
@@ -44,8 +54,7 @@ def without_spikes(vertices: FloatArray, faces: IntArray) -> FloatArray:
         opposite = np.roll(faces, -1, axis=1), np.roll(faces, -2, axis=1)
         across = np.linalg.norm(vertices[opposite[0]] - vertices[opposite[1]], axis=2)
         base = np.bincount(faces.ravel(), weights=across.ravel(), minlength=n) / np.maximum(around, 1)
-        typical = np.median(np.linalg.norm(vertices[a] - vertices[b], axis=1))
-        new = (height > SPIKE_HEIGHT * typical) & (height > SPIKE_SLENDERNESS * base) & (around > 2) & ~spiky
+        new = (height > SPIKE_HEIGHT * typical) & (height > SPIKE_SLENDERNESS * base) & (around > 2) & suspect & ~spiky
         if not new.any():
             break
         spiky |= new

@@ -16,7 +16,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from .mesh import BoolArray, FloatArray, IntArray, TriangleMesh, repeats_a_vertex, unique_edges
+from .mesh import BoolArray, FloatArray, IntArray, TriangleMesh, components_of, repeats_a_vertex, unique_edges
 from .pieces import ties_between_pieces
 from .refine import split_long_edges
 from .repair import small_holes, without_spikes
@@ -186,22 +186,26 @@ def prepare_surface(
     if outside.size:
         vertex_of[outside] = cKDTree(vertices).query(mesh.vertices[outside])[1]
 
-    vertices = without_spikes(vertices, faces)
-    middles, caps = small_holes(TriangleMesh(vertices, faces))
-    vertices, faces = np.concatenate([vertices, middles]), np.concatenate([faces, caps])
+    surface = TriangleMesh(without_spikes(vertices, faces), faces)
+    middles, caps = small_holes(surface)
+    vertices, faces = np.concatenate([surface.vertices, middles]), np.concatenate([faces, caps])
     face_of = np.append(face_of, np.full(len(caps), -1))
     if min_vertices:
-        area = TriangleMesh(vertices, faces).area
-        longest = EDGE * np.sqrt(area / min_vertices)
+        longest = EDGE * np.sqrt(surface.area / min_vertices)
         vertices, faces, piece_of = split_long_edges(vertices, faces, longest, len(vertices) + MOST_NEW * min_vertices)
         face_of = face_of[piece_of]
-    # Refining leaves the old vertices where they were in the list.
-    return Surface(mesh, TriangleMesh(vertices, faces, compact[connection.ties]), vertex_of, face_of, welded_faces)
+    # Caps and refinement leave the old vertices where they were in the list.
+    links = compact[connection.ties]
+    if len(vertices) > surface.n_vertices or len(links):
+        surface = TriangleMesh(vertices, faces, links)
+    return Surface(mesh, surface, vertex_of, face_of, welded_faces)
 
 
 def _in_large_pieces(mesh: TriangleMesh, faces: IntArray, pieces: Pieces) -> BoolArray:
     """(m',) whether each face belongs to a loose part that is large enough for the operator."""
-    piece = TriangleMesh(mesh.vertices, faces).components[faces[:, 0]]
+    piece = components_of(faces, mesh.n_vertices)[faces[:, 0]]
+    if (piece == piece[0]).all():
+        return np.ones(len(faces), dtype=bool)
     corners = mesh.vertices[faces]
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     size = np.bincount(piece, weights=areas)
@@ -235,7 +239,9 @@ def _same_position(mesh: TriangleMesh) -> IntArray:
     """(n,) number of the group of joined vertices that each vertex is in."""
     edges, _, count = unique_edges(mesh.faces)
     length = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
-    diagonal = float(np.linalg.norm(np.ptp(mesh.vertices[np.unique(edges)], axis=0)))
+    used = np.zeros(mesh.n_vertices, dtype=bool)
+    used[edges] = True
+    diagonal = float(np.linalg.norm(np.ptp(mesh.vertices[used], axis=0)))
     tolerance = min(WELD_TOLERANCE * diagonal, WELD_SHARE * float(np.median(length)))
     joined = [edges[length <= tolerance]]
     border = np.unique(edges[count == 1])
