@@ -20,7 +20,7 @@ test: $(VENV)/.ready  ## all tests
 test-oldest: $(OLDEST)/.ready  ## all tests on the oldest Blender that is supported
 	$(OLDEST)/bin/python -m pytest
 
-fuzz: $(VENV)/.ready  ## thousands of broken meshes and model files, with counts (takes half an hour)
+fuzz: $(VENV)/.ready  ## thousands of broken meshes and model files, with counts (takes ten minutes)
 	$(RUN) -m pytest tests -k "any_" --hypothesis-profile fuzz --timeout 7200
 
 lint: $(VENV)/.ready  ## ruff and mypy

@@ -7,6 +7,7 @@ the clean one that each of its faces stands for.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -19,8 +20,8 @@ Perturbed = tuple[TriangleMesh, IntArray]
 
 SHOT = 0.05
 """How far shot noise throws a vertex, as a fraction of the diagonal of the bounding box."""
-HOLE = 0.03
-"""Radius of a hole, as the same fraction."""
+HOLE, LARGE_HOLE = 0.02, 0.03
+"""Radius of a hole, as the same fraction. A large one takes a whole forearm or foot off."""
 REACH = 0.15
 """How far a glued triangle reaches at most, as the same fraction."""
 
@@ -40,12 +41,12 @@ def shot_noise(mesh: TriangleMesh, strength: float, generator: np.random.Generat
     return TriangleMesh(vertices, mesh.faces), np.arange(mesh.n_faces)
 
 
-def holes(mesh: TriangleMesh, strength: float, generator: np.random.Generator) -> Perturbed:
+def holes(mesh: TriangleMesh, strength: float, generator: np.random.Generator, radius: float = HOLE) -> Perturbed:
     """A number of round holes, at places drawn by area."""
     kept = np.ones(mesh.n_faces, dtype=bool)
     centres = mesh.vertices[mesh.faces].mean(axis=1)
     for face in generator.choice(mesh.n_faces, round(strength), p=mesh.face_areas / mesh.area):
-        kept &= np.linalg.norm(centres - centres[face], axis=1) > HOLE * _diagonal(mesh)
+        kept &= np.linalg.norm(centres - centres[face], axis=1) > radius * _diagonal(mesh)
     return _of_faces(mesh, mesh.faces[kept]), np.flatnonzero(kept)
 
 
@@ -109,6 +110,7 @@ PERTURBATIONS: dict[str, tuple[Callable[[TriangleMesh, float, np.random.Generato
     "noise": (noise, (0.05, 0.15, 0.25)),
     "shot noise": (shot_noise, (0.002, 0.005, 0.01)),
     "holes": (holes, (2, 5, 10)),
+    "large holes": (partial(holes, radius=LARGE_HOLE), (2, 5, 10)),
     "glued": (glued, (3, 8, 15)),
     "sampling": (sampling, (1.5, 2.5, 3.5)),
     "finer on one side": (finer, (1, 2, 3)),

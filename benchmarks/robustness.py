@@ -30,10 +30,11 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--segments", type=int, default=8)
     parser.add_argument("--eigenpairs", type=int, default=300)
+    parser.add_argument("--laplacian", default="auto", choices=("auto", "cotangent", "delaunay"))
     parser.add_argument("--kinds", nargs="+", default=list(PERTURBATIONS), choices=PERTURBATIONS)
     options = parser.parse_args()
     body = makehuman.load(options.folder)
-    model = PoseSegmentation(options.segments, n_eigenpairs=options.eigenpairs).fit(
+    model = PoseSegmentation(options.segments, n_eigenpairs=options.eigenpairs, laplacian=options.laplacian).fit(
         [body.posed(seed) for seed in LEARNED]
     )
     clean = [body.posed(seed) for seed in TESTED]

@@ -17,6 +17,7 @@ CHAIN = [
     "refine",
     "surface",
     "laplacian",
+    "intrinsic",
     "factor",
     "coarse",
     "hierarchy",

@@ -31,6 +31,7 @@ OPTIONS = {
     "--covariance": "covariance_type",
     "--scaling": "scaling",
     "--pieces": "pieces",
+    "--laplacian": "laplacian",
     "--limit-minutes": "limit_minutes",
     "--limit-memory": "limit_memory",
     "--smallest-part": "min_share",
@@ -324,8 +325,13 @@ def _result(options: argparse.Namespace, report: Report) -> dict[str, Any]:
     outputs = {"model": options.model, "output": options.output, "render": options.render}
     return {
         "poses": [
-            {"name": pose.name, "vertices": pose.mesh.n_vertices, "triangles": pose.mesh.n_faces}
-            for pose in report.poses
+            {
+                "name": pose.name,
+                "vertices": pose.mesh.n_vertices,
+                "triangles": pose.mesh.n_faces,
+                "laplacian": laplacian,
+            }
+            for pose, laplacian in zip(report.poses, report.laplacians, strict=True)
         ],
         "segments": report.n_segments,
         "seconds": {name: round(seconds, 3) for name, seconds in report.seconds.items()},

@@ -12,6 +12,7 @@ from .palette import MAX_COLOURS
 
 MODEL_PARAMETERS = (
     "n_segments", "n_eigenpairs", "n_energies", "covariance_type", "scaling", "random_state", "pieces",
+    "laplacian",
 )  # fmt: skip
 
 
@@ -94,6 +95,16 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
             ("separate", "Each on Its Own", "Loose parts of one shape get one segment wherever they are"),
         ],
         default="joined",
+    )
+    laplacian: EnumProperty(
+        name="Triangles",
+        description="The triangles on which the spectrum is computed",
+        items=[
+            ("auto", "Automatic", "The mesh's own, unless they are full of slivers"),
+            ("cotangent", "As They Are", "The mesh's own, as in the paper"),
+            ("delaunay", "Intrinsic Delaunay", "The best ones between the same vertices, for meshes full of slivers"),
+        ],
+        default="auto",
     )
     min_share: FloatProperty(
         name="Smallest Part",

@@ -29,6 +29,7 @@ class Report:
     """What happened: for the status bar, the terminal and `--json`."""
 
     poses: list[Pose]
+    laplacians: list[str] = field(default_factory=list)
     n_segments: int = 0
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
@@ -47,6 +48,7 @@ class Report:
             f"{len(self.poses)} pose" + "s" * (len(self.poses) != 1),
             f"{sum(pose.mesh.n_vertices for pose in self.poses):,} vertices",
             f"{self.n_segments} segments",
+            *([f"better triangles for {improved}"] if (improved := self.laplacians.count("delaunay")) else []),
             f"{sum(self.seconds.values()):.1f} seconds",
         ]
 
@@ -183,6 +185,7 @@ def describe(
             raise UserError(str(error)) from error
         report.warnings += dict.fromkeys(str(warning.message) for warning in said)
     of = dict(zip(new, described, strict=True))
+    report.laplacians = [of[first].laplacian for first in same]
     return [of[first] for first in same]
 
 

@@ -1,5 +1,6 @@
 """The method, without Blender: mesh → surface → laplacian → spectrum → signature → mixture → regions → segmentation."""
 
+from .intrinsic import delaunay
 from .laplacian import mass_matrix, stiffness_matrix
 from .mesh import TriangleMesh
 from .mixture import GaussianMixture, fit_mixture
@@ -19,6 +20,7 @@ __all__ = [
     "Surface",
     "TriangleMesh",
     "connect",
+    "delaunay",
     "eigenpairs",
     "fit_mixture",
     "heat_kernel_signature",

@@ -34,19 +34,21 @@ def stiffness_matrix(mesh: TriangleMesh) -> csc_matrix:
     -------
     (n, n) symmetric, positive semi-definite sparse matrix; without unit (it does not change with scale).
     """
-    corners = mesh.vertices[mesh.faces]
-    opposite = np.roll(corners, -1, axis=1) - np.roll(corners, -2, axis=1)
-    squared = np.einsum("mij,mij->mi", opposite, opposite)
-    floor = MIN_DOUBLE_AREA * squared.max(axis=1)
-    # cot γ = (a² + b² − c²) / (4 · area), with c opposite to γ
-    double_area = np.maximum(2 * mesh.face_areas, np.where(floor > 0, floor, 1))
-    cotangents = (squared.sum(axis=1)[:, None] - 2 * squared) / (2 * double_area[:, None])
-    i = np.roll(mesh.faces, -1, axis=1).ravel()
-    j = np.roll(mesh.faces, -2, axis=1).ravel()
+    i, j = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     i, j = np.append(i, mesh.links[:, 0]), np.append(j, mesh.links[:, 1])
-    weight = np.append(cotangents.ravel() / 2, np.full(len(mesh.links), LINK))
+    of_edges = half_cotangents(mesh.lengths, mesh.face_areas * mesh.layers) / mesh.layers
+    weight = np.append(of_edges.ravel(), np.full(len(mesh.links), LINK))
     weights = csr_matrix((np.append(weight, weight), (np.append(i, j), np.append(j, i))), shape=(mesh.n_vertices,) * 2)
     return csc_matrix(diags(np.asarray(weights.sum(axis=1)).ravel()) - weights)
+
+
+def half_cotangents(lengths: FloatArray, areas: FloatArray) -> FloatArray:
+    """(m, 3) half the cotangent of the angle opposite to each edge, of triangles with (m, 3) lengths and (m,) areas."""
+    squared = lengths**2
+    floor = MIN_DOUBLE_AREA * squared.max(axis=1)
+    # cot γ = (a² + b² − c²) / (4 · area), with c opposite to γ
+    double_area = np.maximum(2 * areas, np.where(floor > 0, floor, 1))
+    return np.asarray((squared.sum(axis=1)[:, None] - 2 * squared) / (4 * double_area[:, None]))
 
 
 def mass_matrix(mesh: TriangleMesh, lumped: bool = True) -> csc_matrix:

@@ -25,6 +25,11 @@ class TriangleMesh:
         Vertex indices of each triangle, in either orientation.
     links : (l, 2) array of int, optional
         Pairs of vertices that are tied to each other as if they were neighbours, where loose parts meet.
+    lengths : (m, 3) array of float, optional
+        Lengths of the edges ab, bc and ca of each triangle, where they are not straight lines between its corners (see
+        `delaunay`). A face may name a vertex twice then.
+    layers : int
+        How often the faces cover the surface: each counts for that part of its area.
 
     Raises
     ------
@@ -33,19 +38,36 @@ class TriangleMesh:
         twice, there is no face, or the whole surface has no area. The message says which one and where.
     """
 
-    def __init__(self, vertices: ArrayLike, faces: ArrayLike, links: ArrayLike | None = None) -> None:
+    def __init__(
+        self,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        links: ArrayLike | None = None,
+        lengths: ArrayLike | None = None,
+        layers: int = 1,
+    ) -> None:
+        self.layers = layers
         self.vertices: FloatArray = _checked_vertices(vertices)
-        self.faces: IntArray = _checked_faces(faces, len(self.vertices))
+        self.faces: IntArray = _checked_faces(faces, len(self.vertices), may_repeat=lengths is not None)
         self.links: IntArray = _checked_links(links, len(self.vertices))
+        self._lengths = None if lengths is None else _checked_lengths(lengths, len(self.faces))
         if not self.area > 0:
             raise ValueError("the mesh has no area: all its faces are points or lines; check the scale of the mesh")
         self.vertices.setflags(write=False)
         self.faces.setflags(write=False)
         self.links.setflags(write=False)
 
-    def moved(self, vertices: FloatArray) -> TriangleMesh:
-        """The same faces and links between vertices at other places."""
-        return TriangleMesh(vertices, self.faces, self.links)
+    def with_unit_area(self) -> TriangleMesh:
+        """The same mesh scaled to area 1."""
+        scale = 1 / np.sqrt(self.area)
+        lengths = None if self._lengths is None else self._lengths * scale
+        return TriangleMesh(self.vertices * scale, self.faces, self.links, lengths, self.layers)
+
+    def reordered(self, order: IntArray) -> TriangleMesh:
+        """The same mesh with the (n,) vertices in another order."""
+        place = np.empty_like(order)
+        place[order] = np.arange(len(order))
+        return TriangleMesh(self.vertices[order], place[self.faces], place[self.links], self._lengths, self.layers)
 
     @property
     def n_vertices(self) -> int:
@@ -58,8 +80,15 @@ class TriangleMesh:
         return len(self.faces)
 
     @cached_property
+    def lengths(self) -> FloatArray:
+        """(m, 3) lengths of the edges ab, bc and ca of each triangle, in units of the vertices."""
+        return edge_lengths(self.vertices, self.faces) if self._lengths is None else self._lengths
+
+    @cached_property
     def face_areas(self) -> FloatArray:
         """(m,) area of each triangle, in squared units of the vertices."""
+        if self._lengths is not None:
+            return areas_of_lengths(self._lengths) / self.layers
         a, b, c = (self.vertices[self.faces[:, i]] for i in range(3))
         areas: FloatArray = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
         areas.setflags(write=False)
@@ -98,7 +127,7 @@ def _checked_vertices(vertices: ArrayLike) -> FloatArray:
     return array
 
 
-def _checked_faces(faces: ArrayLike, n_vertices: int) -> IntArray:
+def _checked_faces(faces: ArrayLike, n_vertices: int, may_repeat: bool) -> IntArray:
     array = np.array(faces)
     if array.size == 0:
         raise ValueError("the mesh has no faces")
@@ -114,7 +143,7 @@ def _checked_faces(faces: ArrayLike, n_vertices: int) -> IntArray:
             f"the mesh has {n_vertices} vertices ({bad.size} such faces in all)"
         )
     bad = np.flatnonzero(repeats_a_vertex(array))
-    if bad.size:
+    if bad.size and not may_repeat:
         raise ValueError(f"face {bad[0]} uses a vertex twice: {array[bad[0]].tolist()} ({bad.size} such faces in all)")
     return array
 
@@ -123,6 +152,14 @@ def _checked_links(links: ArrayLike | None, n_vertices: int) -> IntArray:
     array = np.array([] if links is None else links, dtype=np.int64).reshape(-1, 2)
     if ((array < 0) | (array >= n_vertices)).any():
         raise ValueError(f"a link points to a vertex that does not exist; the mesh has {n_vertices} vertices")
+    return array
+
+
+def _checked_lengths(lengths: ArrayLike, n_faces: int) -> FloatArray:
+    array = np.array(lengths, dtype=np.float64)
+    if array.shape != (n_faces, 3) or not np.isfinite(array).all() or (array < 0).any():
+        raise ValueError(f"lengths must be {n_faces} × 3 finite numbers, none of them negative")
+    array.setflags(write=False)
     return array
 
 
@@ -138,6 +175,13 @@ def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """(m, 3) lengths of the edges ab, bc and ca of each triangle."""
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     return np.stack([np.sqrt(np.einsum("ij,ij->i", d, d)) for d in (b - a, c - b, a - c)], axis=1)
+
+
+def areas_of_lengths(lengths: FloatArray) -> FloatArray:
+    """(m,) areas of triangles with (m, 3) lengths of edges, by Kahan's form of Heron's formula."""
+    c, b, a = np.sort(lengths, axis=1).T
+    product = (a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c))
+    return np.asarray(np.sqrt(np.maximum(product, 0)) / 4)
 
 
 def edges_of(faces: IntArray) -> IntArray:

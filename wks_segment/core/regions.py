@@ -58,7 +58,7 @@ def smooth_posteriors(mesh: TriangleMesh, posteriors: FloatArray, length: float)
     One implicit step of heat flow, (M + t S) p' = M p with t = length²: the same on any meshing. On a large surface it
     is taken on cells a fraction of the length wide.
     """
-    level = Level.of(mesh.moved(mesh.vertices / np.sqrt(mesh.area)))
+    level = Level.of(mesh.with_unit_area())
     right = level.mass @ posteriors.astype(np.float32)
     prolongation = None
     if mesh.n_vertices > LARGE:

@@ -19,6 +19,7 @@ from scipy.sparse import diags
 from threadpoolctl import threadpool_limits
 
 from . import model_file
+from .intrinsic import Laplacian, better_triangles
 from .laplacian import unit_area_masses
 from .memory import available_memory
 from .mesh import FloatArray, IntArray, TriangleMesh
@@ -63,11 +64,14 @@ class PoseSignature:
     signature : (n', n_energies) array of float
     n_eigenpairs : int
         What it was computed from.
+    laplacian : "cotangent" or "delaunay"
+        The triangles that it was computed on.
     """
 
     surface: Surface
     signature: FloatArray
     n_eigenpairs: int
+    laplacian: Laplacian = "cotangent"
 
 
 class PoseSegmentation:
@@ -93,6 +97,9 @@ class PoseSegmentation:
         signature as the paper has it.
     pieces : "joined" or "separate"
         Loose parts tied to what they are nearest to, so that they make sense together, or each by itself.
+    laplacian : "auto", "cotangent" or "delaunay"
+        The paper's cotangents on the mesh's own triangles, or on better ones between the same vertices (`delaunay`);
+        "auto" takes the mesh's own unless they are full of slivers.
 
     Attributes
     ----------
@@ -112,6 +119,7 @@ class PoseSegmentation:
         random_state: int = 0,
         scaling: Scaling = "log",
         pieces: Pieces = "joined",
+        laplacian: Literal["auto"] | Laplacian = "auto",
     ) -> None:
         self.n_segments = n_segments
         self.covariance_type = covariance_type
@@ -121,6 +129,7 @@ class PoseSegmentation:
         self.random_state = random_state
         self.scaling = scaling
         self.pieces = pieces
+        self.laplacian = laplacian
 
     def describe(
         self,
@@ -151,8 +160,9 @@ class PoseSegmentation:
         self._check_parameters()
         surface = prepare_surface(mesh, VERTICES_PER_PAIR * self.n_eigenpairs, connection, self.pieces)
         n_pairs = self.n_eigenpairs + surface.n_components - 1
-        signature = wave_kernel_signature_of(surface.mesh, n_pairs, self.n_energies, self.accuracy, progress)
-        return PoseSignature(surface, signature, self.n_eigenpairs)
+        mesh, laplacian = better_triangles(surface.mesh, self.laplacian)
+        signature = wave_kernel_signature_of(mesh, n_pairs, self.n_energies, self.accuracy, progress)
+        return PoseSignature(surface, signature, self.n_eigenpairs, laplacian)
 
     def describe_all(
         self,
@@ -438,6 +448,7 @@ class PoseSegmentation:
             "accuracy": get_args(Accuracy),
             "scaling": get_args(Scaling),
             "pieces": get_args(Pieces),
+            "laplacian": ("auto", *get_args(Laplacian)),
         }
         for name, allowed in choices.items():
             if getattr(self, name) not in allowed:
