@@ -19,6 +19,12 @@ BEND = {
 }  # fmt: skip
 """Bones that move, by the beginning of their names, and the largest angle in degrees about each axis."""
 BODY = "body"
+JOINTS = {
+    "Root": "root", "Spine1": "spine04", "Spine2": "spine03", "Spine3": "spine01", "Neck": "neck01", "Head": "head",
+    "Clavicle": "clavicle", "UpArm": "upperarm01", "LoArm": "lowerarm01", "Hand": "wrist", "UpLeg": "upperleg01",
+    "LoLeg": "lowerleg01", "Foot": "foot",
+}  # fmt: skip
+"""Bones of the rig for the joints of its older motion files, without the side."""
 
 
 @dataclass(frozen=True)
@@ -48,13 +54,22 @@ class MakeHuman:
     def posed(self, seed: int, body_only: bool = True) -> TriangleMesh:
         """The mesh with its joints turned at random by a seed; 0 is the rest pose."""
         generator = np.random.default_rng(seed)
-        world: dict[str, FloatArray] = {}
-        for name, (parent, head) in self.bones.items():
+        turns: dict[str, FloatArray] = {}
+        for name, (parent, _) in self.bones.items():
             most = next((angle for prefix, angle in BEND.items() if name.startswith(prefix)), 0) * (seed > 0)
             turn = Rotation.from_euler("xyz", generator.uniform(-most, most, 3), degrees=True).as_matrix()
+            turns[name] = turns[parent] @ turn if parent else turn
+        return self.turned(turns, body_only)
+
+    def turned(self, turns: dict[str, FloatArray], body_only: bool = True) -> TriangleMesh:
+        """The mesh with bones turned from rest by (3, 3) matrices in the world's axes; others follow their parents."""
+        world: dict[str, FloatArray] = {}
+        for name, (parent, head) in self.bones.items():
+            before = world[parent] if parent else np.eye(4)
             local = np.eye(4)
-            local[:3, :3], local[:3, 3] = turn, head - turn @ head
-            world[name] = world[parent] @ local if parent else local
+            local[:3, :3] = turns.get(name, before[:3, :3])
+            local[:3, 3] = before[:3, :3] @ head + before[:3, 3] - local[:3, :3] @ head
+            world[name] = local
         blended = np.einsum("nb,bij->nij", self.weights, np.stack(list(world.values())))
         vertices = np.einsum("nij,nj->ni", blended[:, :3, :3], self.vertices) + blended[:, :3, 3]
         faces = self.faces[self.group_of == BODY] if body_only else self.faces
@@ -92,3 +107,45 @@ def load(folder: Path) -> MakeHuman:
     weights[weights.sum(axis=1) == 0, place["root"]] = 1
     weights /= weights.sum(axis=1, keepdims=True)
     return MakeHuman(points, np.array(faces), np.array(group_of), bones, weights)
+
+
+def motion(path: Path) -> list[dict[str, FloatArray]]:
+    """Frames of a BVH file for the rig: how each bone is turned from rest, in the axes of the mesh."""
+    joints: list[tuple[str, int, list[str]]] = []
+    open_joints: list[int] = []
+    lines = iter(path.read_text(encoding="utf-8").splitlines())
+    skipping, offset = False, np.zeros(3)
+    for words in map(str.split, lines):
+        if words[0] in ("ROOT", "JOINT"):
+            joints.append((words[1], open_joints[-1] if open_joints else -1, []))
+            open_joints.append(len(joints) - 1)
+        elif words[0] == "End":
+            skipping = True
+        elif words[0] == "}":
+            skipping = False if skipping else not open_joints.pop()
+        elif words[0] == "OFFSET" and len(joints) == 1:
+            offset = np.array(words[1:], dtype=float)
+        elif words[0] == "CHANNELS":
+            joints[-1][2].extend(words[2:])
+        elif words[0] == "Frame":
+            break
+    # Some have their height along z, the mesh has it along y.
+    upright = Rotation.from_euler("x", -90, degrees=True).as_matrix() if offset[2] > offset[1] else np.eye(3)
+    return [_turns(joints, np.array(line.split(), dtype=float), upright) for line in lines if line.strip()]
+
+
+def _turns(joints: list[tuple[str, int, list[str]]], numbers: FloatArray, upright: FloatArray) -> dict[str, FloatArray]:
+    turns: dict[str, FloatArray] = {}
+    so_far: list[FloatArray] = []
+    begin = 0
+    for name, parent, channels in joints:
+        turn = so_far[parent] if parent >= 0 else np.eye(3)
+        for channel, angle in zip(channels, numbers[begin : begin + len(channels)], strict=True):
+            if channel.endswith("rotation"):
+                turn = turn @ Rotation.from_euler(channel[0].lower(), angle, degrees=True).as_matrix()
+        begin += len(channels)
+        so_far.append(turn)
+        base, _, side = name.partition("_")
+        bone = f"{JOINTS[base]}{'.' * bool(side)}{side}" if base in JOINTS else name
+        turns[bone] = upright @ turn @ upright.T
+    return turns
