@@ -106,7 +106,9 @@ def finer(mesh: TriangleMesh, strength: float, generator: np.random.Generator) -
     return TriangleMesh(vertices, faces), owner
 
 
-PERTURBATIONS: dict[str, tuple[Callable[[TriangleMesh, float, np.random.Generator], Perturbed], tuple[float, ...]]] = {
+Perturbation = tuple[Callable[[TriangleMesh, float, np.random.Generator], Perturbed], tuple[float, ...]]
+
+PERTURBATIONS: dict[str, Perturbation] = {
     "noise": (noise, (0.05, 0.15, 0.25)),
     "shot noise": (shot_noise, (0.002, 0.005, 0.01)),
     "holes": (holes, (2, 5, 10)),

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import makehuman
-from benchmarks.perturbations import PERTURBATIONS
+from benchmarks.perturbations import PERTURBATIONS, Perturbation
 from benchmarks.speed import table_row
 from wks_segment.core import PoseSegmentation, TriangleMesh
 from wks_segment.core.mesh import IntArray
@@ -33,22 +33,27 @@ def main() -> None:
     parser.add_argument("--laplacian", default="auto", choices=("auto", "cotangent", "delaunay"))
     parser.add_argument("--kinds", nargs="+", default=list(PERTURBATIONS), choices=PERTURBATIONS)
     options = parser.parse_args()
-    body = makehuman.load(options.folder)
-    model = PoseSegmentation(options.segments, n_eigenpairs=options.eigenpairs, laplacian=options.laplacian).fit(
-        [body.posed(seed) for seed in LEARNED]
-    )
+    model = PoseSegmentation(options.segments, n_eigenpairs=options.eigenpairs, laplacian=options.laplacian)
+    table(options.folder, model, options.kinds)
+
+
+def table(folder: Path, model: PoseSegmentation, kinds: Sequence[str] = tuple(PERTURBATIONS)) -> None:
+    """Learn a model on clean poses of the body and print how much of damaged ones keeps its label."""
+    body = makehuman.load(folder)
+    model.fit([body.posed(seed) for seed in LEARNED])
     clean = [body.posed(seed) for seed in TESTED]
     expected = [model.segment_faces(mesh) for mesh in clean]
     print(table_row(["damage", "weak", "middle", "strongest"]) + "\n" + table_row(["---"] * 4))
-    for kind in options.kinds:
-        print(table_row([kind, *(f"{share:.3f}" for share in agreements(model, kind, clean, expected))]), flush=True)
+    for kind in kinds:
+        shares = agreements(model, PERTURBATIONS[kind], clean, expected)
+        print(table_row([kind, *(f"{share:.3f}" for share in shares)]), flush=True)
 
 
 def agreements(
-    model: PoseSegmentation, kind: str, clean: Sequence[TriangleMesh], expected: Sequence[IntArray]
+    model: PoseSegmentation, perturbation: Perturbation, clean: Sequence[TriangleMesh], expected: Sequence[IntArray]
 ) -> list[float]:
     """Share of the area that keeps its label at each strength, the mean of all meshes."""
-    damage, strengths = PERTURBATIONS[kind]
+    damage, strengths = perturbation
     shares = []
     for strength in strengths:
         of_meshes = []

@@ -17,7 +17,7 @@ def test_real_character_is_segmented(command, tmp_path, name):
     done = command("segment", path, "--frames", 3, "--eigenpairs", 60, "--output", output, "--json")
     assert done.code == 0, done
     assert len(done.result["poses"]) == 3
-    assert done.result["warnings"] == [], "the poses are all the same"
+    assert not any("the same" in warning for warning in done.result["warnings"])
     assert 4 <= done.result["segments"] <= 8
     bpy.ops.wm.open_mainfile(filepath=str(output))
     labelled = [obj for obj in bpy.data.objects if obj.type == "MESH" and "wks_segment" in obj.data.attributes]

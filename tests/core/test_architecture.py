@@ -26,6 +26,8 @@ CHAIN = [
     "signature",
     "mixture",
     "regions",
+    "shape",
+    "parts",
     "model_file",
     "segmentation",
 ]

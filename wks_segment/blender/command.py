@@ -35,6 +35,8 @@ OPTIONS = {
     "--limit-minutes": "limit_minutes",
     "--limit-memory": "limit_memory",
     "--smallest-part": "min_share",
+    "--smoothness": "smoothness",
+    "--preset": "preset",
 }
 """Options that are settings: their text, limits and defaults come from the property group."""
 

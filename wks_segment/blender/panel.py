@@ -88,7 +88,17 @@ class WKS_SEGMENT_PT_advanced(_SubPanel, bpy.types.Panel):
     bl_label = "Advanced"
 
     def draw(self, context: bpy.types.Context) -> None:
-        self.settings(context, "pieces", "min_share", "scaling", "laplacian", "limit_minutes", "limit_memory")
+        self.settings(
+            context,
+            "smoothness",
+            "min_share",
+            "preset",
+            "pieces",
+            "scaling",
+            "laplacian",
+            "limit_minutes",
+            "limit_memory",
+        )
 
 
 CLASSES = (WKS_SEGMENT_PT_main, WKS_SEGMENT_PT_outputs, WKS_SEGMENT_PT_model, WKS_SEGMENT_PT_advanced)

@@ -12,7 +12,7 @@ from .palette import MAX_COLOURS
 
 MODEL_PARAMETERS = (
     "n_segments", "n_eigenpairs", "n_energies", "covariance_type", "scaling", "random_state", "pieces",
-    "laplacian",
+    "laplacian", "smoothness", "preset",
 )  # fmt: skip
 
 
@@ -55,8 +55,10 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         default=8, min=2, max=MAX_COLOURS, soft_max=20,
     )  # fmt: skip
     random_state: IntProperty(
-        name="Seed", description="The same seed gives the same parts; another one may find others", default=0, min=0
-    )
+        name="Seed",
+        description="Where the paper's setting begins its search. Otherwise nothing depends on luck, nor on this",
+        default=0, min=0,
+    )  # fmt: skip
     n_eigenpairs: IntProperty(
         name="Eigenpairs",
         description="How much detail the signature sees. Fewer are faster and coarser",
@@ -83,7 +85,7 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         description="What enters the mixture",
         items=[
             ("log", "Logarithm", "Limbs and torso count as much as fingers and toes"),
-            ("raw", "As in the Paper", "The signature itself; the finest parts dominate"),
+            ("raw", "Plain", "The signature itself; the finest parts dominate"),
         ],
         default="log",
     )
@@ -106,6 +108,20 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         ],
         default="auto",
     )
+    preset: EnumProperty(
+        name="Method",
+        description="How the parts are learned",
+        items=[
+            ("default", "Robust", "What measures best on poses and bodies that were not learned from"),
+            ("paper", "As in the Paper", "A mixture of the signatures themselves, its components as labels"),
+        ],
+        default="default",
+    )
+    smoothness: FloatProperty(
+        name="Smoothness",
+        description="How smooth the borders are. Zero leaves every vertex the label of its own signature",
+        default=1.0, min=0.0, max=10.0, soft_max=3.0, precision=2,
+    )  # fmt: skip
     min_share: FloatProperty(
         name="Smallest Part",
         description="A connected part below this share of the surface joins its neighbour",

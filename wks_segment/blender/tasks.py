@@ -195,6 +195,8 @@ def label(
 ) -> dict[Character, IntArray]:  # fmt: skip
     """Components of each character's polygons, agreed on by all of its poses, and by all objects that share a mesh."""
     labels: dict[Character, IntArray] = {}
+    model.smoothness = settings.smoothness
+    min_share = None if model.preset == "paper" else settings.min_share / 100
     with report.stage("label"):
         meshes = [tuple(obj.data for obj in pose.character.objects) for pose in poses]
         for mesh in dict.fromkeys(meshes):
@@ -203,7 +205,7 @@ def label(
             found = model.segment_polygons(
                 [described[i] for i in mine],
                 [poses[i].polygon_of for i in mine],
-                settings.min_share / 100,
+                min_share,
                 lambda share, name=name: progress(f'Labels of "{name}"', 1.0),
             )
             found = filled(found, poses[mine[0]].character)

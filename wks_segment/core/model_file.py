@@ -17,7 +17,7 @@ FORMAT = "wks_segment model"
 VERSION = 1
 PARAMETERS = (
     "n_segments", "covariance_type", "n_eigenpairs", "n_energies", "accuracy", "random_state", "scaling",
-    "pieces", "laplacian",
+    "pieces", "laplacian", "smoothness", "preset",
 )  # fmt: skip
 LARGEST = {"n_segments": 1000, "n_eigenpairs": 5000, "n_energies": 1000}
 """A file that asks for more would have a mesh refined until the memory is full."""

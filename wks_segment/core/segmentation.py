@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from os import PathLike
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from scipy.sparse import diags
@@ -23,13 +23,15 @@ from .intrinsic import Laplacian, better_triangles
 from .laplacian import unit_area_masses
 from .memory import available_memory
 from .mesh import FloatArray, IntArray, TriangleMesh
-from .mixture import CovarianceType, GaussianMixture, fit_mixture
+from .mixture import CovarianceType, GaussianMixture, drawn_evenly, fit_mixture
+from .parts import parts
 from .regions import FaceAdjacency, connected_regions, merge_crumbs, smooth_posteriors
 from .signature import wave_kernel_signature_of
 from .spectrum import Accuracy, SpectrumError, memory_needed, seconds_needed
 from .surface import Connection, Pieces, Surface, connect_alike, indicator, prepare_surface
 
 Scaling = Literal["log", "raw"]
+Preset = Literal["default", "paper"]
 Progress = Callable[[str, float], None]
 """Called with the stage and the fraction of the whole that is done, 0 to 1. An error that it raises ends the work."""
 
@@ -43,14 +45,20 @@ BESIDE_EIGENPAIRS = 1.5
 """Time of the whole job in that of its eigenpairs, about."""
 MOST = 0.9
 """Share of the work that is not the mixture."""
-SIGNATURE_OFFSET = 0.01
-"""Added to the signature, whose mean is 1, before its logarithm: tiny loose parts take no part in low energies."""
+SIGNATURE_OFFSET = 0.1
+"""Added to the signature, whose mean is 1, before its logarithm: smaller values change much from pose to pose and say
+little, and tiny loose parts take no part in low energies."""
+MOST_SMOOTHNESS = 10
 MAX_SAMPLES = 20_000
-"""Vertices that take part in the mixture, drawn by area where there are more."""
+"""Vertices that take part in the mixture, spread evenly by area where there are more."""
 MIN_SHARE = 0.005
 """Smallest part, as a share of the area."""
-SMOOTHING_LENGTH = 0.03
-"""Width of the smoothing along borders, in units of the square root of the area."""
+SMOOTHING_LENGTH = 0.06
+"""Width of the smoothing along borders at smoothness 1, in units of the square root of the area."""
+PAPER: dict[str, Any] = {
+    "covariance_type": "diag", "scaling": "raw", "laplacian": "cotangent", "smoothness": 0.0,
+}  # fmt: skip
+"""What `preset="paper"` means: a mixture of the signatures themselves, started once, and its components as labels."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +99,7 @@ class PoseSegmentation:
     accuracy : "fast" or "exact"
         See `eigenpairs`.
     random_state : int
-        Seed; the same input and seed give the same model.
+        Seed of the one start by k-means in the paper's setting. Otherwise nothing is drawn at random.
     scaling : "log" or "raw"
         What enters the mixture: the logarithm of the signature, so that fine parts do not outweigh limbs, or the
         signature as the paper has it.
@@ -100,6 +108,10 @@ class PoseSegmentation:
     laplacian : "auto", "cotangent" or "delaunay"
         The paper's cotangents on the mesh's own triangles, or on better ones between the same vertices (`delaunay`);
         "auto" takes the mesh's own unless they are full of slivers.
+    smoothness : float
+        How smooth borders are and how large the smallest part; 0: every vertex has the label of its own signature.
+    preset : "default" or "paper"
+        "paper" overrides `covariance_type`, `scaling`, `laplacian` and `smoothness` by the paper's own setting.
 
     Attributes
     ----------
@@ -120,6 +132,8 @@ class PoseSegmentation:
         scaling: Scaling = "log",
         pieces: Pieces = "joined",
         laplacian: Literal["auto"] | Laplacian = "auto",
+        smoothness: float = 1.0,
+        preset: Preset = "default",
     ) -> None:
         self.n_segments = n_segments
         self.covariance_type = covariance_type
@@ -130,6 +144,8 @@ class PoseSegmentation:
         self.scaling = scaling
         self.pieces = pieces
         self.laplacian = laplacian
+        self.smoothness = smoothness
+        self.preset = preset
 
     def describe(
         self,
@@ -160,7 +176,7 @@ class PoseSegmentation:
         self._check_parameters()
         surface = prepare_surface(mesh, VERTICES_PER_PAIR * self.n_eigenpairs, connection, self.pieces)
         n_pairs = self.n_eigenpairs + surface.n_components - 1
-        mesh, laplacian = better_triangles(surface.mesh, self.laplacian)
+        mesh, laplacian = better_triangles(surface.mesh, self._setting("laplacian"))
         signature = wave_kernel_signature_of(mesh, n_pairs, self.n_energies, self.accuracy, progress)
         return PoseSignature(surface, signature, self.n_eigenpairs, laplacian)
 
@@ -291,7 +307,7 @@ class PoseSegmentation:
         shares = weights / weights.sum()
         signatures = [pose.signature for pose in poses]
         if len(shares) > MAX_SAMPLES:
-            drawn = np.sort(np.random.default_rng(self.random_state).choice(len(shares), MAX_SAMPLES, p=shares))
+            drawn = drawn_evenly(shares, MAX_SAMPLES)
             starts = np.cumsum([0, *(len(signature) for signature in signatures)])
             first = np.searchsorted(drawn, starts)
             signatures = [
@@ -301,12 +317,15 @@ class PoseSegmentation:
         samples = self._scaled(np.concatenate(signatures)).astype(np.float64)
         self.centre_ = shares @ samples
         self.spread_ = np.maximum(np.sqrt(shares @ (samples - self.centre_) ** 2), model_file.LEAST)
+        if self.preset == "paper":
+            self.spread_ = np.ones_like(self.spread_)
+        covariance_type = self._setting("covariance_type")
         self.mixture_ = fit_mixture(
             (samples - self.centre_) / self.spread_,
             shares,
             self.n_segments,
-            "shared" if self.covariance_type == "auto" else self.covariance_type,
-            self.random_state,
+            "shared" if covariance_type == "auto" else covariance_type,
+            self.random_state if self.preset == "paper" else None,
             lambda share: tick("mixture", MOST + (1 - MOST) * share),
         )
         tick("done", 1.0)
@@ -334,27 +353,43 @@ class PoseSegmentation:
         # A density in standardised units, brought back to those of the signature that models share.
         return float(masses @ likelihoods / masses.sum() - np.log(self.spread_).sum())
 
-    def segment_faces(self, mesh: TriangleMesh | PoseSignature, min_share: float = MIN_SHARE) -> IntArray:
+    def segment_faces(self, mesh: TriangleMesh | PoseSignature, min_share: float | None = None) -> IntArray:
         """(m,) component of each face, cleaned: smooth borders, no connected part under `min_share` of the area.
 
+        `min_share` is 0.005 if not given, and 0 without smoothing.
         A loose piece that is smaller as a whole takes the label of what is next to it.
         """
         self._fitted()
         return self._clean([self._described(mesh)], None, min_share)[0]
 
-    def segment_regions(self, mesh: TriangleMesh | PoseSignature, min_share: float = MIN_SHARE) -> IntArray:
+    def segment_regions(self, mesh: TriangleMesh | PoseSignature, min_share: float | None = None) -> IntArray:
         """(m,) connected part of each face, numbered 0, 1, …: left and right hand are two.
 
-        A loose piece under `min_share` of the area belongs to the part next to it.
+        Cut as a person would: between components, along creases and where the thickness changes, and not within what
+        has neither (see `parts`); without smoothing, the connected parts of the components. Parts under `min_share` of
+        the area belong to the part next to them. Numbered by component first.
         """
         self._fitted()
-        return connected_regions(*self._clean([self._described(mesh)], None, min_share))
+        pose = self._described(mesh)
+        labels, adjacency = self._clean([pose], None, min_share)
+        if self._setting("smoothness") == 0:
+            return connected_regions(labels, adjacency)
+        original = pose.surface.original
+        own = FaceAdjacency.of(pose.surface.welded_faces, original.vertices)
+        centres = original.vertices[original.faces].mean(axis=1)
+        share = MIN_SHARE if min_share is None else min_share
+        part, tied = merge_crumbs(parts(pose.surface, labels, own), original.face_areas, centres, own, share)
+        region = connected_regions(part, tied)
+        # The component that most of a region's area belongs to decides on its number.
+        shares = np.zeros((int(region.max()) + 1, self.n_segments))
+        np.add.at(shares, (region, labels), original.face_areas)
+        return np.asarray(np.argsort(np.lexsort((np.arange(len(shares)), shares.argmax(axis=1))))[region])
 
     def segment_polygons(
         self,
         poses: Sequence[TriangleMesh | PoseSignature],
         polygons: Sequence[IntArray],
-        min_share: float = MIN_SHARE,
+        min_share: float | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> IntArray:
         """Label the polygons of one mesh, seen in one or several poses, as `segment_faces` does.
@@ -449,10 +484,17 @@ class PoseSegmentation:
             "scaling": get_args(Scaling),
             "pieces": get_args(Pieces),
             "laplacian": ("auto", *get_args(Laplacian)),
+            "preset": get_args(Preset),
         }
+        if not isinstance(self.smoothness, int | float) or not 0 <= self.smoothness <= MOST_SMOOTHNESS:
+            raise ValueError(f"smoothness must be a number from 0 to {MOST_SMOOTHNESS}, not {self.smoothness!r}")
         for name, allowed in choices.items():
             if getattr(self, name) not in allowed:
                 raise ValueError(f"{name} must be one of {allowed}, not {getattr(self, name)!r}")
+
+    def _setting(self, name: str) -> Any:
+        """What holds for a parameter that the preset may override."""
+        return PAPER[name] if self.preset == "paper" else getattr(self, name)
 
     def _fitted(self) -> GaussianMixture:
         if not hasattr(self, "mixture_"):
@@ -473,7 +515,7 @@ class PoseSegmentation:
         return self.describe(mesh)
 
     def _scaled(self, signature: FloatArray) -> FloatArray:
-        return np.log(signature + SIGNATURE_OFFSET) if self.scaling == "log" else signature
+        return np.log(signature + SIGNATURE_OFFSET) if self._setting("scaling") == "log" else signature
 
     def _standardised(self, signature: FloatArray) -> FloatArray:
         scaled = self._scaled(signature)  # a new array, or the signature itself; in its own precision
@@ -488,10 +530,13 @@ class PoseSegmentation:
         self,
         poses: Sequence[PoseSignature],
         polygons: Sequence[IntArray] | None,
-        min_share: float,
+        min_share: float | None,
         progress: Callable[[float], None] | None = None,
     ) -> tuple[IntArray, FaceAdjacency]:
         """Labels of polygons (None: each triangle is one) from the mean posterior of all poses, and neighbours."""
+        smoothness = self._setting("smoothness")
+        if min_share is None:
+            min_share = MIN_SHARE if smoothness > 0 else 0.0
         if not 0 <= min_share < 1:
             raise ValueError(f"min_share must be from 0 to below 1, not {min_share!r}")
         if polygons is None:
@@ -508,8 +553,10 @@ class PoseSegmentation:
             total = sum_over @ weight
             seen = total > 0
             mean = diags(1 / np.where(seen, total, 1)) @ sum_over @ diags(weight)
-            smooth = smooth_posteriors(surface.mesh, self._posteriors(pose), SMOOTHING_LENGTH)
-            posteriors += mean @ surface.to_faces(smooth)
+            of_vertices = self._posteriors(pose)
+            if smoothness > 0:
+                of_vertices = smooth_posteriors(surface.mesh, of_vertices, smoothness * SMOOTHING_LENGTH)
+            posteriors += mean @ surface.to_faces(of_vertices)
             centres += mean @ original.vertices[original.faces].mean(axis=1)
             areas += total * seen
             poses_seen += seen

@@ -1,0 +1,258 @@
+"""How good the parts are: `python -m benchmarks.quality WHAT DATA [--output FOLDER]`.
+
+WHAT is one of
+
+consistency  area of unseen poses that has the learned label (characters, and MakeHuman's body in its own motions)
+human        connected parts against people's (Rand-index error), components against part names (adjusted Rand index)
+seeds        adjusted Rand index between the labels of models that were learned with five seeds
+retrieval    share of shapes whose class has the model under which they are likeliest
+remesh       area that keeps its label when a mesh is resampled to half and to twice its faces
+robustness   the same for damaged meshes (as `benchmarks.robustness`)
+
+DATA is a folder with `characters` (what Blender imports), `makehuman` (its `3dobjs`, `rigs` and motions) and `psb` (the
+Princeton benchmark as .npz, numbered as there). Prints Markdown tables, the paper's setting beside the default, and
+writes pictures.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from itertools import combinations
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from sklearn.metrics import adjusted_rand_score
+
+from benchmarks import characters, makehuman, perturbations, robustness
+from benchmarks.speed import table_row
+from wks_segment.core import PoseSegmentation, PoseSignature, TriangleMesh, connect
+from wks_segment.core.mesh import IntArray
+
+PRESETS = ("default", "paper")
+CLASSES = {"human": 1, "chair": 101, "octopus": 121, "plier": 201, "fish": 221}
+"""First number of each class of twenty in the Princeton benchmark."""
+LEARNED = (0, 4, 8, 12, 16)
+"""Models of a class that are learned from: 1, 5, 9, 13 and 17."""
+MOTIONS_LEARNED = ("walk1 0", "walk1 7", "zombieWalk1 12", "benchmark 0", "tpose 0")
+FRAMES = 6
+"""Frames of a motion that are taken, first and last among them."""
+SEEDS = range(5)
+PICTURED = 8
+"""Shapes of a class in a picture."""
+Described = dict[str, PoseSignature]
+
+
+def main() -> None:
+    """Run one of the studies."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=STUDIES)
+    parser.add_argument("data", type=Path)
+    parser.add_argument("--output", type=Path, default=Path("demo/quality"))
+    parser.add_argument("--segments", type=int, default=8)
+    options = parser.parse_args()
+    options.output.mkdir(parents=True, exist_ok=True)
+    STUDIES[options.what](options)
+
+
+def consistency(options: argparse.Namespace) -> None:
+    """Unseen frames of the characters, unseen motions of MakeHuman's body."""
+    for preset in PRESETS:
+        print(f"\n### {preset}\n\n| character | vertices | CPU s a pose | learned | unseen | worst |\n|{'---|' * 6}")
+        settings = ["--segments", str(options.segments), "--preset", preset]
+        paths = sorted(p for p in (options.data / "characters").iterdir() if p.suffix in characters.FILES)
+        output = options.output / preset
+        output.mkdir(exist_ok=True)
+        rows = [characters.measure(path, output, settings) for path in paths]
+        unseen = [row["unseen"] for row in rows]
+        print(
+            f"| **mean of {len(rows)}** | | | | **{np.mean(unseen):.3f}** | {min(row['worst'] for row in rows):.3f} |"
+        )
+        characters.contact_sheet([output / f"{path.stem}.png" for path in paths], output / "sheet.png")
+    frames, described = _motions(options.data / "makehuman")
+    rows_of = {}
+    for preset in PRESETS:
+        model = _model(options, preset).fit([described[name] for name in MOTIONS_LEARNED])
+        faces = np.arange(next(iter(frames.values())).n_faces)
+        known = model.segment_polygons([described[name] for name in MOTIONS_LEARNED], [faces] * len(MOTIONS_LEARNED))
+        labels = {name: known if name in MOTIONS_LEARNED else model.segment_faces(described[name]) for name in frames}
+        rows_of[preset] = [
+            float(np.average(labels[name] == known, weights=frames[name].face_areas))
+            for name in frames
+            if name not in MOTIONS_LEARNED
+        ]
+        _picture([(name, frames[name], labels[name]) for name in frames], options.output / f"makehuman_{preset}.png")
+    print("\n| MakeHuman's own motions, unseen | mean | worst |\n|---|---|---|")
+    for preset, shares in rows_of.items():
+        print(table_row([preset, f"{np.mean(shares):.4f}", f"{min(shares):.3f}"]))
+
+
+def human(options: argparse.Namespace) -> None:
+    """Connected parts and components of the Princeton classes against those of people."""
+    print("| class | setting | Rand-index error | regions | people against each other | their parts | part names |")
+    print("|" + "---|" * 7)
+    errors: dict[str, list[float]] = {preset: [] for preset in PRESETS}
+    for name in CLASSES:
+        truth, described = _princeton(options.data / "psb", name)
+        shapes = list(described)
+        people = [float(np.mean(_among(t["human_segmentations"]))) for t in truth.values()]
+        parts = [len(np.unique(one)) for t in truth.values() for one in t["human_segmentations"]]
+        for preset in PRESETS:
+            model = _model(options, preset).fit([described[shapes[i]] for i in LEARNED])
+            unseen = [shape for i, shape in enumerate(shapes) if i not in LEARNED]
+            regions = {shape: model.segment_regions(described[shape]) for shape in unseen}
+            of_people = [
+                np.mean([rand_index_error(regions[shape], one) for one in truth[shape]["human_segmentations"]])
+                for shape in unseen
+            ]
+            named = [
+                adjusted_rand_score(truth[shape]["part_names"], model.segment_faces(described[shape]))
+                for shape in unseen
+                if "part_names" in truth[shape]
+            ]
+            errors[preset].append(float(np.mean(of_people)))
+            print(
+                table_row([
+                    name, preset, f"{np.mean(of_people):.3f}",
+                    f"{np.mean([region.max() + 1 for region in regions.values()]):.1f}", f"{np.mean(people):.3f}",
+                    f"{np.mean(parts):.1f}", f"{np.mean(named):.3f}" if named else "",
+                ]),
+                flush=True,
+            )  # fmt: skip
+            pictured = [(s, _upright(described[s].surface.original), regions[s]) for s in unseen[:PICTURED]]
+            _picture(pictured, options.output / f"{name}_{preset}.png")
+    for preset in PRESETS:
+        print(table_row(["**mean**", preset, f"**{np.mean(errors[preset]):.3f}**", "", "", "", ""]))
+
+
+def seeds(options: argparse.Namespace) -> None:
+    """Labels of models that differ by their seed only."""
+    print("| learned from | setting | mean of all pairs | lowest |\n|---|---|---|---|")
+    _, humans = _princeton(options.data / "psb", "human")
+    shapes = list(humans)
+    sets = {"Princeton humans": ([humans[shapes[i]] for i in LEARNED], [humans[s] for s in shapes[1::4]])}
+    _, body = _motions(options.data / "makehuman")
+    sets["MakeHuman"] = [body[n] for n in MOTIONS_LEARNED], [d for n, d in body.items() if n not in MOTIONS_LEARNED]
+    for name, (learned, others) in sets.items():
+        for preset in PRESETS:
+            labels = []
+            for seed in SEEDS:
+                model = _model(options, preset)
+                model.random_state = seed
+                model.fit(learned)
+                labels.append(np.concatenate([model.predict(one) for one in others]))
+            agreement = [adjusted_rand_score(a, b) for a, b in combinations(labels, 2)]
+            print(table_row([name, preset, f"{np.mean(agreement):.3f}", f"{min(agreement):.3f}"]), flush=True)
+
+
+def retrieval(options: argparse.Namespace) -> None:
+    """The paper's section 5 on the Princeton classes: five models of each learned, fifteen asked for."""
+    described = {name: list(_princeton(options.data / "psb", name)[1].values()) for name in CLASSES}
+    for preset in PRESETS:
+        models = {name: _model(options, preset).fit([shapes[i] for i in LEARNED]) for name, shapes in described.items()}
+        table = np.zeros((len(CLASSES),) * 2, dtype=int)
+        for i, shapes in enumerate(described.values()):
+            for shape in (one for j, one in enumerate(shapes) if j not in LEARNED):
+                table[i, int(np.argmax([model.score(shape) for model in models.values()]))] += 1
+        print(f"\n| {preset}: queries of | {' | '.join(CLASSES)} |\n|{'---|' * (len(CLASSES) + 1)}")
+        for name, row in zip(CLASSES, table, strict=True):
+            print(table_row([name, *map(str, row)]))
+        print(f"\nright: {np.trace(table)} of {table.sum()} ({np.trace(table) / table.sum():.1%})", flush=True)
+
+
+def remesh(options: argparse.Namespace) -> None:
+    """MakeHuman's body with half of its faces, by Decimate, and with twice as many."""
+    body = makehuman.load(options.data / "makehuman")
+    clean = [body.posed(seed) for seed in robustness.TESTED]
+    print("| resampled to | default | paper |\n|---|---|---|")
+    kinds = {"half the faces": ("sampling", 2.0), "twice the faces, on one side four times": ("finer on one side", 1.0)}
+    rows: dict[str, list[str]] = {kind: [] for kind in kinds}
+    for preset in PRESETS:
+        model = _model(options, preset).fit([body.posed(seed) for seed in robustness.LEARNED])
+        expected = [model.segment_faces(mesh) for mesh in clean]
+        for kind, (name, strength) in kinds.items():
+            resampled = perturbations.PERTURBATIONS[name][0], (strength,)
+            rows[kind].append(f"{robustness.agreements(model, resampled, clean, expected)[0]:.3f}")
+    for kind, shares in rows.items():
+        print(table_row([kind, *shares]))
+
+
+def damage(options: argparse.Namespace) -> None:
+    """The table of `benchmarks.robustness`, for both settings."""
+    for preset in PRESETS:
+        print(f"\n### {preset}\n")
+        robustness.table(options.data / "makehuman", _model(options, preset))
+
+
+STUDIES: dict[str, Callable[[argparse.Namespace], None]] = {
+    "consistency": consistency, "human": human, "seeds": seeds, "retrieval": retrieval, "remesh": remesh,
+    "robustness": damage,
+}  # fmt: skip
+
+
+def rand_index_error(labels: IntArray, others: Any) -> float:
+    """Share of the pairs of faces that one segmentation puts together and the other apart."""
+    n = len(labels)
+    table = coo_matrix((np.ones(n), (labels, np.unique(others, return_inverse=True)[1].ravel()))).toarray()
+    together = (table.sum(axis=1) ** 2).sum() + (table.sum(axis=0) ** 2).sum()
+    return float((together / 2 - (table**2).sum()) / (n * (n - 1) / 2))
+
+
+def _among(segmentations: Sequence[Any]) -> list[float]:
+    each = [np.unique(one, return_inverse=True)[1].ravel() for one in segmentations]
+    return [rand_index_error(a, b) for a, b in combinations(each, 2)] or [0.0]
+
+
+def _model(options: argparse.Namespace, preset: str) -> PoseSegmentation:
+    return PoseSegmentation(options.segments, preset=preset)  # type: ignore[arg-type]
+
+
+def _princeton(folder: Path, name: str) -> tuple[dict[str, Any], Described]:
+    """Arrays and signatures of a class. Both settings share the signatures: they are of the same eigenpairs."""
+    numbers = [CLASSES[name] + i for i in range(20)]
+    truth = {f"{name} {number}": np.load(folder / f"{number}.npz") for number in numbers}
+    meshes = [TriangleMesh(arrays["vertices"], arrays["faces"]) for arrays in truth.values()]
+    found = PoseSegmentation().describe_all(meshes, [connect(mesh) for mesh in meshes])
+    return truth, dict(zip(truth, found, strict=True))
+
+
+def _motions(folder: Path) -> tuple[dict[str, TriangleMesh], Described]:
+    """MakeHuman's body in frames of its own motions."""
+    body = makehuman.load(folder)
+    frames = {}
+    for path in sorted(folder.rglob("*.bvh")):
+        motion = makehuman.motion(path)
+        for i in np.unique(np.linspace(0, len(motion) - 1, FRAMES).astype(int)):
+            frames[f"{path.stem} {i}"] = body.turned(motion[i])
+    connection = connect(*frames.values(), rest=body.posed(0))
+    found = PoseSegmentation().describe_all(list(frames.values()), [connection] * len(frames))
+    return frames, dict(zip(frames, found, strict=True))
+
+
+def _upright(mesh: TriangleMesh) -> TriangleMesh:
+    """From y upwards to Blender's z upwards."""
+    return TriangleMesh(mesh.vertices[:, [0, 2, 1]] * (1, -1, 1), mesh.faces)
+
+
+def _picture(shapes: Sequence[tuple[str, TriangleMesh, IntArray]], path: Path) -> None:
+    from wks_segment.blender.picture import Tile, render_poses
+    from wks_segment.blender.poses import Pose
+
+    tiles = []
+    for name, mesh, labels in shapes:
+        scaled = TriangleMesh(mesh.vertices / np.ptp(mesh.vertices, axis=0).max(), mesh.faces)
+        pose = SimpleNamespace(mesh=scaled, polygon_of=np.arange(mesh.n_faces))
+        tiles.append(Tile(cast(Pose, pose), labels, name))
+    render_poses(tiles, path)
+    print(f"\npicture: {path}\n", flush=True)
+
+
+if __name__ == "__main__":
+    main()
+    sys.stdout.flush()
+    os._exit(0)  # some versions of bpy crash at a normal exit

@@ -1,0 +1,151 @@
+"""Parts as a person would cut them: normalized cuts along creases, where the thickness changes, between components.
+
+Golovinskiy and Funkhouser, "Randomized cuts for 3D mesh analysis" (2008), section 4.2, after Shi and Malik (2000):
+patches grow together as long as that lowers the sum over all parts of border length by area. A border weighs less where
+people cut.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+from .mesh import FloatArray, IntArray
+from .regions import FaceAdjacency, connected_regions
+from .shape import COARSE, FINE, curvature_across, log_thickness, smooth_normals
+from .surface import Surface
+
+PATCHES = 250
+"""Patches that a surface is cut into at first."""
+PATCH_CREASE = 0.3
+"""How much longer a way across a crease is, in units of its curvature: patches end there."""
+CREASE, MOST_CONCAVE, MOST_CONVEX = 0.4, 15.0, 2.0
+"""Weight of a border by e to this times its curvature, which is taken between these bounds."""
+STEP, MOST_STEP = 0.1, 40.0
+"""Weight of a border by e to minus this times the change of log thickness over the unit of length, bounded."""
+BETWEEN_COMPONENTS = 0.8
+"""Weight of a border between two components of the mixture."""
+GAIN = 10.0
+"""Parts grow together while that lowers the sum of border by area by this, for a surface of area 1."""
+SHORTEST = 3e-3
+"""Distance between faces from which on changes count as changes over that distance."""
+
+
+def border_weights(surface: Surface, adjacency: FaceAdjacency) -> tuple[FloatArray, FloatArray]:
+    """(p,) weight of the border between neighbours, 1 where nothing speaks for a cut, and its fine curvature."""
+    fine = smooth_normals(surface, FINE)
+    thickness = surface.to_faces(log_thickness(surface, fine)[:, None])[:, 0]
+    curvature = curvature_across(surface, smooth_normals(surface, COARSE), adjacency)
+    a, b = adjacency.pairs.T
+    step = np.abs(thickness[a] - thickness[b]) / np.maximum(_distances(surface, adjacency), SHORTEST)
+    concave = CREASE * np.clip(curvature, -MOST_CONCAVE, MOST_CONVEX)
+    return np.exp(concave - STEP * np.minimum(step, MOST_STEP)), curvature_across(surface, fine, adjacency)
+
+
+def parts(surface: Surface, components: IntArray, adjacency: FaceAdjacency) -> IntArray:
+    """Cut a surface into parts.
+
+    Parameters
+    ----------
+    surface : Surface
+        With m original faces.
+    components : (m,) int array
+        Component of each face, cleaned.
+    adjacency : FaceAdjacency
+        Of the original faces.
+
+    Returns
+    -------
+    (m,) int array: connected part of each face.
+    """
+    weights, curvature = border_weights(surface, adjacency)
+    a, b = adjacency.pairs.T
+    weights = np.where(components[a] != components[b], BETWEEN_COMPONENTS * weights, weights)
+    patch = _patches(surface, adjacency, curvature)
+    count = int(components.max()) + 1
+    patch = connected_regions(patch * count + components, adjacency)
+    areas = surface.original.face_areas / surface.original.area
+    lengths = adjacency.lengths / np.sqrt(surface.original.area)
+    return normalized_cut(patch, areas, FaceAdjacency(adjacency.pairs, lengths), weights)
+
+
+def normalized_cut(
+    patch: IntArray, areas: FloatArray, adjacency: FaceAdjacency, weights: FloatArray, gain: float = GAIN
+) -> IntArray:
+    """Let patches grow together, best pair first, while that lowers the sum of border by area by `gain`.
+
+    Parameters
+    ----------
+    patch : (m,) int array
+        Numbered 0, 1, …, r − 1.
+    areas : (m,) array
+        Of the faces; they sum to 1.
+    adjacency, weights
+        Borders between faces, their lengths in units of the square root of the area, and the weight of each.
+    """
+    count = int(patch.max()) + 1
+    a, b = patch[adjacency.pairs].T
+    across = a != b
+    shape = (count, count)
+    lengths = adjacency.lengths[across]
+    cut = coo_matrix((lengths * weights[across], (a[across], b[across])), shape=shape).toarray()
+    cut += cut.T
+    touch = coo_matrix((np.ones(len(lengths)), (a[across], b[across])), shape=shape).toarray() > 0
+    touch |= touch.T
+    area = np.maximum(np.bincount(patch, weights=areas, minlength=count), 1e-12)
+    border = cut.sum(axis=1)
+
+    def gains(i: IntArray) -> FloatArray:
+        """Of joining each of some parts with every other."""
+        alone = border[i, None] / area[i, None] + border / area
+        together = (border[i, None] + border - 2 * cut[i]) / (area[i, None] + area)
+        return np.where(touch[i], alone - together, -np.inf)
+
+    gained = gains(np.arange(count))
+    owner = np.arange(count)
+    for _ in range(count - 1):
+        i, j = divmod(int(gained.argmax()), count)
+        if gained[i, j] < gain:
+            break
+        owner[owner == i] = j
+        area[j] += area[i]
+        cut[j] += cut[i]
+        touch[j] |= touch[i]
+        cut[i], touch[i] = 0, False
+        cut[:, j], touch[:, j] = cut[j], touch[j]
+        cut[:, i], touch[:, i] = 0, False
+        cut[j, j], touch[j, j] = 0, False
+        border[j], border[i] = cut[j].sum(), 0
+        gained[i] = gained[:, i] = -np.inf
+        gained[j] = gains(np.array([j]))[0]
+        gained[:, j] = gained[j]
+    return np.asarray(np.unique(owner, return_inverse=True)[1][patch])
+
+
+def _patches(surface: Surface, adjacency: FaceAdjacency, curvature: FloatArray) -> IntArray:
+    """(m,) patch of each face: that of the seed which is nearest, ways across creases being longer."""
+    original = surface.original
+    m = original.n_faces
+    centres = original.vertices[original.faces].mean(axis=1)
+    ways = _distances(surface, adjacency) * (1 + PATCH_CREASE * np.clip(-curvature, 0, MOST_CONCAVE)) + 1e-9
+    a, b = adjacency.pairs.T
+    graph = coo_matrix((np.append(ways, ways), (np.append(a, b), np.append(b, a))), shape=(m, m)).tocsr()
+    # Seeds as far from each other as can be, and one in each loose part.
+    seeds = [int(original.face_areas.argmax())]
+    distance = np.full(m, np.inf)
+    for _ in range(min(PATCHES, m) - 1):
+        offset = centres - centres[seeds[-1]]
+        np.minimum(distance, np.einsum("ij,ij->i", offset, offset), out=distance)
+        seeds.append(int(distance.argmax()))
+    of_parts = np.unique(connected_components(graph, directed=False)[1], return_index=True)[1]
+    nearest = dijkstra(graph, indices=np.unique(np.append(seeds, of_parts)), min_only=True, return_predecessors=True)[2]
+    return np.asarray(np.unique(nearest, return_inverse=True)[1])
+
+
+def _distances(surface: Surface, adjacency: FaceAdjacency) -> FloatArray:
+    """(p,) between the centres of neighbours, in units of the square root of the area."""
+    original = surface.original
+    centres = original.vertices[original.faces].mean(axis=1) / np.sqrt(original.area)
+    a, b = adjacency.pairs.T
+    return np.asarray(np.linalg.norm(centres[a] - centres[b], axis=1))
