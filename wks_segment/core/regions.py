@@ -6,12 +6,14 @@ from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags
 from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from .coarse import Level
-from .factor import NestedDissectionFactor
+from .factor import NestedDissectionFactor, SingularError
+from .laplacian import stiffness_matrix, unit_area_masses
 from .mesh import FloatArray, IntArray, TriangleMesh, edges_of
 
 LARGE = 200_000
@@ -58,14 +60,23 @@ def smooth_posteriors(mesh: TriangleMesh, posteriors: FloatArray, length: float)
     One implicit step of heat flow, (M + t S) p' = M p with t = length²: the same on any meshing. On a large surface it
     is taken on cells a fraction of the length wide.
     """
-    level = Level.of(mesh.with_unit_area())
+    unit = mesh.with_unit_area()
+    level = Level.of(unit)
     right = level.mass @ posteriors.astype(np.float32)
     prolongation = None
     if mesh.n_vertices > LARGE:
         prolongation, level = level.coarsened(round((CELLS_PER_LENGTH / length) ** 2))
         right = prolongation.T @ right
     system = csr_matrix(level.mass + np.float32(length**2) * level.stiffness)
-    smooth = NestedDissectionFactor(system, level.positions).solve(right)
+    try:
+        factor = NestedDissectionFactor(system, level.positions)
+    except SingularError:
+        factor = None
+    if factor is None or factor.n_negative:
+        # Slivers weigh so much more than areas that single precision loses these.
+        exact = diags(unit_area_masses(unit)) + length**2 * stiffness_matrix(unit)
+        return np.asarray(splu(csc_matrix(exact)).solve(unit_area_masses(unit)[:, None] * posteriors))
+    smooth = factor.solve(right)
     return smooth if prolongation is None else np.asarray(prolongation @ smooth)
 
 

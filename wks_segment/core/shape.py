@@ -26,6 +26,8 @@ ROUNDS = 30
 """Rounds of shrinking at most. Five are usual."""
 NOISE = 0.5
 """Cosine of the angle between the two places where a ball touches, from which on it is the surface's own roughness."""
+SLACK = 0.01
+"""How much further than the nearest place the one may be that is found, as a fraction."""
 MOST_BALLS = 20_000
 """Vertices at which thickness is measured; others take it from the nearest of these."""
 FLAT = 0.003
@@ -90,24 +92,25 @@ def log_thickness(surface: Surface, normals: FloatArray) -> FloatArray:
     """
     mesh = surface.mesh
     places = mesh.vertices / np.sqrt(mesh.area)
-    spacing = np.sqrt(2.3 / len(places))
-    tree = cKDTree(places)
     step = max(1, len(places) // MOST_BALLS)
-    chosen = np.arange(0, len(places), step)
-    radius = np.full(len(chosen), WIDEST)
-    active = np.arange(len(chosen))
+    points, directions = places[::step], normals[::step]
+    spacing = np.sqrt(2.3 / len(points))
+    tree = cKDTree(points)
+    radius = np.full(len(points), WIDEST)
+    active = np.arange(len(points))
     for _ in range(ROUNDS):
-        p, n = places[chosen[active]], normals[chosen[active]]
-        distance, nearest = tree.query(p - radius[active, None] * n)
+        p, n = points[active], directions[active]
+        # From the middle of a ball everything is equally near, and the exact search would look at all of it.
+        distance, nearest = tree.query(p - radius[active, None] * n, eps=SLACK)
         inside = distance < radius[active] * (1 - 1e-4) - 1e-9
         active, nearest, p, n = active[inside], nearest[inside], p[inside], n[inside]
         if not len(active):
             break
-        smaller, rough = _touching(p, n, places[nearest], normals[nearest], spacing)
+        smaller, rough = _touching(p, n, points[nearest], directions[nearest], spacing)
         active, smaller = active[~rough], smaller[~rough]
         radius[active] = np.minimum(smaller, radius[active])
     if step > 1:
-        radius = radius[cKDTree(places[chosen]).query(places)[1]]
+        radius = radius[tree.query(places)[1]]
     logs = np.log(radius + FLAT)[:, None]
     return np.asarray(smooth_posteriors(mesh, logs, THICKNESS_LENGTH)[:, 0], dtype=np.float64)
 
