@@ -30,14 +30,16 @@ def test_labels_or_a_reason(drawn):
     vertices, faces, names = drawn
     try:
         mesh = TriangleMesh(vertices, faces)
-        labels = model_of_a_good_mesh().segment_faces(mesh)
-        score = model_of_a_good_mesh().score(mesh)
+        model = model_of_a_good_mesh()
+        pose = model.describe(mesh)
+        labels, regions, score = model.segment_faces(pose), model.segment_regions(pose), model.score(pose)
     except (ValueError, SpectrumError) as error:
         assert len(str(error)) > 20, error
         count("mesh, labelled by a model", names, "refused")
         return
     assert labels.shape == (len(faces),)
     assert set(labels.tolist()) <= {0, 1, 2}
+    assert np.array_equal(np.unique(regions), np.arange(regions.max() + 1))
     assert np.isfinite(score)
     count("mesh, labelled by a model", names, "labelled")
 

@@ -53,7 +53,7 @@ MAX_SAMPLES = 20_000
 """Vertices that take part in the mixture, spread evenly by area where there are more."""
 MIN_SHARE = 0.005
 """Smallest part, as a share of the area."""
-SMOOTHING_LENGTH = 0.06
+SMOOTHING_LENGTH = 0.03
 """Width of the smoothing along borders at smoothness 1, in units of the square root of the area."""
 PAPER: dict[str, Any] = {
     "covariance_type": "diag", "scaling": "raw", "laplacian": "cotangent", "smoothness": 0.0,
