@@ -5,7 +5,7 @@ from shapes import creature, icosphere, together
 from wks_segment.core import PoseSegmentation, TriangleMesh, prepare_surface
 from wks_segment.core.parts import normalized_cut, parts
 from wks_segment.core.regions import FaceAdjacency, connected_regions
-from wks_segment.core.shape import FINE, curvature_across, log_thickness, outward, smooth_normals
+from wks_segment.core.shape import FINE, curvature_across, log_thickness, outward, smooth_normals, vertex_normals
 
 AREA_OF_UNIT_SPHERE = 4 * np.pi
 
@@ -48,7 +48,7 @@ def test_faces_turn_outward_however_they_come():
 def test_a_sphere_is_as_thick_and_as_curved_as_its_radius(turned):
     sphere = icosphere(4)
     surface = prepare_surface(TriangleMesh(sphere.vertices, sphere.faces[:, ::-1]) if turned else sphere)
-    normals = smooth_normals(surface, FINE)
+    normals = smooth_normals(surface, vertex_normals(surface), FINE)
     radius = 1 / np.sqrt(AREA_OF_UNIT_SPHERE)
     np.testing.assert_allclose(np.exp(log_thickness(surface, normals)) - 0.003, radius, rtol=0.05)
     np.testing.assert_allclose(curvature_across(surface, normals, adjacency_of(surface)), 1 / radius, rtol=0.15)
@@ -58,7 +58,8 @@ def test_a_sheet_is_thin_on_a_coarse_mesh_too():
     sphere = icosphere(3)
     sheet = TriangleMesh(sphere.vertices * (1, 1, 0.02), sphere.faces)
     surface = prepare_surface(sheet)
-    thickness = np.exp(log_thickness(surface, smooth_normals(surface, FINE))) - 0.003
+    normals = smooth_normals(surface, vertex_normals(surface), FINE)
+    thickness = np.exp(log_thickness(surface, normals)) - 0.003
     middle = np.hypot(*sheet.vertices[:, :2].T) < 0.6
     assert np.median(thickness[middle]) * np.sqrt(sheet.area) < 0.03
 
@@ -71,6 +72,18 @@ def test_patches_grow_together_across_what_is_not_a_border():
     np.testing.assert_array_equal(normalized_cut(np.arange(6), areas, adjacency, weights, 0.1), [0, 0, 0, 1, 1, 1])
     assert normalized_cut(np.arange(6), areas, adjacency, weights, 0.0).max() == 0
     assert normalized_cut(np.arange(6), areas, adjacency, weights, 100.0).max() == 5
+
+
+def test_thousands_of_loose_patches_are_no_table_of_all_with_all():
+    # 20,000 pairs of patches, each pair by itself: all with all would be 12 GB.
+    n = 20_000
+    pairs = np.arange(2 * n).reshape(n, 2)
+    adjacency = FaceAdjacency(pairs, np.full(n, 0.01))
+    weights = np.where(np.arange(n) % 2, 1.0, 0.0)
+    found = normalized_cut(np.arange(2 * n), np.full(2 * n, 1 / (2 * n)), adjacency, weights, 10.0)
+    together = found[pairs[:, 0]] == found[pairs[:, 1]]
+    np.testing.assert_array_equal(together, weights > 0)
+    assert len(np.unique(found)) == 2 * n - np.count_nonzero(together)
 
 
 def test_a_dumbbell_has_two_parts_that_meet_at_its_neck():

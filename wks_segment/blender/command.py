@@ -79,7 +79,7 @@ def _parser() -> argparse.ArgumentParser:
     apply = commands.add_parser("apply", help="find the parts of a model in files")
     _add_poses(apply)
     apply.add_argument("--model", type=Path, required=True, help="a model that learn or segment wrote")
-    for option in ("--smallest-part", "--limit-minutes", "--limit-memory"):
+    for option in ("--smoothness", "--smallest-part", "--limit-minutes", "--limit-memory"):
         _add_setting(apply, option, OPTIONS[option])
     _add_outputs(apply)
     apply.set_defaults(run=_apply)
@@ -188,6 +188,8 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     report = Report([], n_segments=model.n_segments)
     poses = _read(options, report)
     settings = _settings(options)
+    if options.smoothness is not None:
+        model.smoothness = settings.smoothness
     tasks.check_limits(model, poses, settings)
     described = tasks.describe(model, poses, report, progress)
     _label(model, poses, described, settings, options, report, progress)

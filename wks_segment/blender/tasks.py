@@ -195,7 +195,6 @@ def label(
 ) -> dict[Character, IntArray]:  # fmt: skip
     """Components of each character's polygons, agreed on by all of its poses, and by all objects that share a mesh."""
     labels: dict[Character, IntArray] = {}
-    model.smoothness = settings.smoothness
     min_share = None if model.preset == "paper" else settings.min_share / 100
     with report.stage("label"):
         meshes = [tuple(obj.data for obj in pose.character.objects) for pose in poses]

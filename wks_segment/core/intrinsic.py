@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from .laplacian import half_cotangents
-from .mesh import BoolArray, FloatArray, IntArray, TriangleMesh, areas_of_lengths, edges_of
+from .mesh import BoolArray, FloatArray, IntArray, TriangleMesh, areas_of_lengths, unique_edges
 
 Laplacian = Literal["cotangent", "delaunay"]
 
@@ -31,8 +31,9 @@ MAX_ROUNDS = 500
 
 def is_full_of_slivers(mesh: TriangleMesh) -> bool:
     """Whether so many edges have a negative cotangent weight that flips pay."""
-    _, twin = np.unique(_edge_numbers(mesh.faces), return_inverse=True)
-    weights = np.bincount(twin, weights=half_cotangents(mesh.lengths, mesh.face_areas).ravel())
+    weights = np.bincount(
+        unique_edges(mesh.faces)[1].ravel(), weights=half_cotangents(mesh.lengths, mesh.face_areas).ravel()
+    )
     return float(np.maximum(-weights, 0).sum()) > SLIVERS * float(np.abs(weights).sum())
 
 
@@ -60,9 +61,9 @@ def delaunay(mesh: TriangleMesh) -> TriangleMesh:
     The same n vertices and m faces, or 2 m in two layers, with `lengths`. A face may name a vertex twice (an edge that
     runs around a thin limb, and ends where it began).
     """
-    numbers = _edge_numbers(mesh.faces)
-    layers = 1 if (np.unique(numbers, return_counts=True)[1] == 2).all() else 2
-    state = _Flips.of(mesh, numbers, layers)
+    _, edge, count = unique_edges(mesh.faces)
+    layers = 1 if (count == 2).all() else 2
+    state = _Flips.of(mesh, edge.ravel(), count, layers)
     for _ in range(MAX_ROUNDS):
         chosen = state.choose()
         if not len(chosen):
@@ -95,15 +96,15 @@ class _Flips:
     unsure: BoolArray
 
     @classmethod
-    def of(cls, mesh: TriangleMesh, numbers: IntArray, layers: int) -> _Flips:
-        """Sew the faces of a mesh together, given the number of the edge of each side."""
+    def of(cls, mesh: TriangleMesh, edge: IntArray, count: IntArray, layers: int) -> _Flips:
+        """Sew the faces of a mesh together, given the edge that each side lies on and how many faces that has."""
         lengths = mesh.lengths
         slack = lengths.sum(axis=1) - 2 * lengths.max(axis=1)
         # The same for all edges, so that both faces of one agree; nothing if all is well.
         lengths = lengths + max(0.0, LEAST_SLACK * float(lengths.mean()) - float(slack.min()))
         corners = mesh.faces.ravel()
-        order = np.lexsort((_angles_around_edges(mesh, numbers), numbers))
-        first = np.flatnonzero(np.diff(numbers[order], prepend=-1))
+        order = np.lexsort((_angles_around_edges(mesh, count[edge] > 2), edge))
+        first = np.flatnonzero(np.diff(edge[order], prepend=-1))
         following = np.arange(1, len(order) + 1)
         following[np.append(first[1:], len(order)) - 1] = first  # around the edge, the first comes after the last
         here, there = order, order[following]
@@ -189,11 +190,10 @@ def _other_diagonal(ab: FloatArray, bc: FloatArray, ca: FloatArray, ad: FloatArr
     return np.asarray(np.hypot(x - u, y + v))
 
 
-def _angles_around_edges(mesh: TriangleMesh, numbers: IntArray) -> FloatArray:
-    """(3 m,) direction in which a face leaves the edge of each side, as an angle around it; 0 where one suffices."""
-    angles = np.zeros(len(numbers))
-    _, edge, count = np.unique(numbers, return_inverse=True, return_counts=True)
-    many = np.flatnonzero(count[edge] > 2)
+def _angles_around_edges(mesh: TriangleMesh, wanted: BoolArray) -> FloatArray:
+    """(3 m,) direction in which a face leaves the edge of each side that is wanted, as an angle around it; else 0."""
+    angles = np.zeros(len(wanted))
+    many = np.flatnonzero(wanted)
     ends = np.stack([mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()], axis=1)[many]
     start, end = mesh.vertices[ends.min(axis=1)], mesh.vertices[ends.max(axis=1)]
     axis = end - start
@@ -204,9 +204,3 @@ def _angles_around_edges(mesh: TriangleMesh, numbers: IntArray) -> FloatArray:
     dot = np.einsum("ij,ij->i", away, across)
     angles[many] = np.arctan2(np.einsum("ij,ij->i", away, np.cross(axis, across)), dot)
     return angles
-
-
-def _edge_numbers(faces: IntArray) -> IntArray:
-    """(3 m,) a number for the edge that each side lies on."""
-    edges = edges_of(faces)
-    return np.asarray(edges @ np.array([int(edges.max()) + 1, 1]))

@@ -57,17 +57,16 @@ class TriangleMesh:
         self.faces.setflags(write=False)
         self.links.setflags(write=False)
 
-    def with_unit_area(self) -> TriangleMesh:
-        """The same mesh scaled to area 1."""
+    def with_unit_area(self, place: IntArray | None = None) -> TriangleMesh:
+        """The same mesh scaled to area 1; each vertex at its (n,) `place` in the list, if given."""
         scale = 1 / np.sqrt(self.area)
         lengths = None if self._lengths is None else self._lengths * scale
-        return TriangleMesh(self.vertices * scale, self.faces, self.links, lengths, self.layers)
-
-    def reordered(self, order: IntArray) -> TriangleMesh:
-        """The same mesh with the (n,) vertices in another order."""
-        place = np.empty_like(order)
-        place[order] = np.arange(len(order))
-        return TriangleMesh(self.vertices[order], place[self.faces], place[self.links], self._lengths, self.layers)
+        vertices, faces, links = self.vertices * scale, self.faces, self.links
+        if place is not None:
+            moved = np.empty_like(vertices)
+            moved[place] = vertices
+            vertices, faces, links = moved, place[faces], place[links]
+        return TriangleMesh(vertices, faces, links, lengths, self.layers)
 
     @property
     def n_vertices(self) -> int:

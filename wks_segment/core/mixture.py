@@ -27,10 +27,9 @@ VARIANCE_FLOOR = 1e-3
 MAX_ITERATIONS = 200
 TOLERANCE = 1e-4
 """EM ends when the mean log-likelihood rises by less than this in one round."""
-STARTS = 10
-"""EM is started this often by k-means, on a sketch of the samples; the likeliest mixture is refined on all of them."""
-SEEDS = range(STARTS)
-"""Seeds of k-means in these starts, the same in every fit: what comes out is no matter of luck."""
+SEEDS = range(10)
+"""EM is started by k-means from each of these, on a sketch of the samples; the likeliest mixture is refined on all of
+them. The same in every fit: what comes out is no matter of luck."""
 SKETCHED = 0.6
 """Share of the work that the starts are."""
 SKETCH = 4_000

@@ -11,9 +11,9 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from .mesh import FloatArray, IntArray
+from .mesh import BoolArray, FloatArray, IntArray
 from .regions import FaceAdjacency, connected_regions
-from .shape import COARSE, FINE, curvature_across, log_thickness, smooth_normals
+from .shape import COARSE, FINE, curvature_across, log_thickness, smooth_normals, vertex_normals
 from .surface import Surface
 
 PATCHES = 250
@@ -34,9 +34,10 @@ SHORTEST = 3e-3
 
 def border_weights(surface: Surface, adjacency: FaceAdjacency) -> tuple[FloatArray, FloatArray]:
     """(p,) weight of the border between neighbours, 1 where nothing speaks for a cut, and its fine curvature."""
-    fine = smooth_normals(surface, FINE)
+    normals = vertex_normals(surface)
+    fine = smooth_normals(surface, normals, FINE)
     thickness = surface.to_faces(log_thickness(surface, fine)[:, None])[:, 0]
-    curvature = curvature_across(surface, smooth_normals(surface, COARSE), adjacency)
+    curvature = curvature_across(surface, smooth_normals(surface, normals, COARSE), adjacency)
     a, b = adjacency.pairs.T
     step = np.abs(thickness[a] - thickness[b]) / np.maximum(_distances(surface, adjacency), SHORTEST)
     concave = CREASE * np.clip(curvature, -MOST_CONCAVE, MOST_CONVEX)
@@ -87,20 +88,33 @@ def normalized_cut(
     count = int(patch.max()) + 1
     a, b = patch[adjacency.pairs].T
     across = a != b
-    shape = (count, count)
+    a, b, shape = a[across], b[across], (count, count)
     lengths = adjacency.lengths[across]
-    cut = coo_matrix((lengths * weights[across], (a[across], b[across])), shape=shape).toarray()
-    cut += cut.T
-    touch = coo_matrix((np.ones(len(lengths)), (a[across], b[across])), shape=shape).toarray() > 0
-    touch |= touch.T
+    cut = coo_matrix((lengths * weights[across], (a, b)), shape=shape).tocsr()
+    touch = coo_matrix((np.ones(len(a)), (a, b)), shape=shape).tocsr()
     area = np.maximum(np.bincount(patch, weights=areas, minlength=count), 1e-12)
-    border = cut.sum(axis=1)
+    owner = np.arange(count)
+    # What does not hang together never grows together: a thousand loose parts are a thousand small tables.
+    together = connected_components(touch, directed=False)[1]
+    order = np.argsort(together, kind="stable")
+    for some in np.split(order, np.flatnonzero(np.diff(together[order])) + 1):
+        if len(some) > 1:
+            block = np.ix_(some, some)
+            border, beside = cut[block].toarray(), touch[block].toarray() > 0
+            owner[some] = some[_grown_together(border + border.T, beside | beside.T, area[some], gain)]
+    return np.asarray(np.unique(owner, return_inverse=True)[1][patch])
+
+
+def _grown_together(cut: FloatArray, touch: BoolArray, area: FloatArray, gain: float) -> IntArray:
+    """(r,) the patch that each of r patches belongs to in the end, given weighted borders, neighbours and areas."""
+    count = len(area)
+    area, border = area.copy(), cut.sum(axis=1)
 
     def gains(i: IntArray) -> FloatArray:
         """Of joining each of some parts with every other."""
         alone = border[i, None] / area[i, None] + border / area
-        together = (border[i, None] + border - 2 * cut[i]) / (area[i, None] + area)
-        return np.where(touch[i], alone - together, -np.inf)
+        joined = (border[i, None] + border - 2 * cut[i]) / (area[i, None] + area)
+        return np.where(touch[i], alone - joined, -np.inf)
 
     gained = gains(np.arange(count))
     owner = np.arange(count)
@@ -120,7 +134,7 @@ def normalized_cut(
         gained[i] = gained[:, i] = -np.inf
         gained[j] = gains(np.array([j]))[0]
         gained[:, j] = gained[j]
-    return np.asarray(np.unique(owner, return_inverse=True)[1][patch])
+    return owner
 
 
 def _patches(surface: Surface, adjacency: FaceAdjacency, curvature: FloatArray) -> IntArray:

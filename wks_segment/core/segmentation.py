@@ -377,8 +377,8 @@ class PoseSegmentation:
         original = pose.surface.original
         own = FaceAdjacency.of(pose.surface.welded_faces, original.vertices)
         centres = original.vertices[original.faces].mean(axis=1)
-        share = MIN_SHARE if min_share is None else min_share
-        part, tied = merge_crumbs(parts(pose.surface, labels, own), original.face_areas, centres, own, share)
+        cut = parts(pose.surface, labels, own)
+        part, tied = merge_crumbs(cut, original.face_areas, centres, own, self._least_share(min_share))
         region = connected_regions(part, tied)
         # The component that most of a region's area belongs to decides on its number.
         shares = np.zeros((int(region.max()) + 1, self.n_segments))
@@ -492,6 +492,14 @@ class PoseSegmentation:
             if getattr(self, name) not in allowed:
                 raise ValueError(f"{name} must be one of {allowed}, not {getattr(self, name)!r}")
 
+    def _least_share(self, min_share: float | None) -> float:
+        """Smallest part, as a share of the area; ValueError if it is none."""
+        if min_share is None:
+            return MIN_SHARE if self._setting("smoothness") > 0 else 0.0
+        if not 0 <= min_share < 1:
+            raise ValueError(f"min_share must be from 0 to below 1, not {min_share!r}")
+        return min_share
+
     def _setting(self, name: str) -> Any:
         """What holds for a parameter that the preset may override."""
         return PAPER[name] if self.preset == "paper" else getattr(self, name)
@@ -535,10 +543,7 @@ class PoseSegmentation:
     ) -> tuple[IntArray, FaceAdjacency]:
         """Labels of polygons (None: each triangle is one) from the mean posterior of all poses, and neighbours."""
         smoothness = self._setting("smoothness")
-        if min_share is None:
-            min_share = MIN_SHARE if smoothness > 0 else 0.0
-        if not 0 <= min_share < 1:
-            raise ValueError(f"min_share must be from 0 to below 1, not {min_share!r}")
+        least = self._least_share(min_share)
         if polygons is None:
             polygons = [np.arange(pose.surface.original.n_faces) for pose in poses]
         n_polygons = 1 + max(int(polygon_of.max()) for polygon_of in polygons)
@@ -568,4 +573,4 @@ class PoseSegmentation:
         adjacency = max(borders, key=lambda border: len(border.pairs))
         centres /= np.maximum(poses_seen, 1)[:, None]
         labels = np.where(seen, posteriors.argmax(axis=1), -1)
-        return merge_crumbs(labels, areas, centres, adjacency, min_share)
+        return merge_crumbs(labels, areas, centres, adjacency, least)

@@ -12,7 +12,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from .mesh import BoolArray, FloatArray, IntArray, edges_of
+from .mesh import BoolArray, FloatArray, IntArray, unique_edges
 from .regions import FaceAdjacency, smooth_posteriors
 from .surface import Surface, indicator
 
@@ -40,11 +40,10 @@ def outward(faces: IntArray, corners: FloatArray) -> FloatArray:
     Neighbours are made to agree, then the larger side of each loose part is taken for the inside.
     """
     m = len(faces)
-    ends = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    rising = ends[:, 0] < ends[:, 1]
-    key = edges_of(faces) @ np.array([int(faces.max()) + 1, 1])
-    order = np.argsort(key, kind="stable")
-    same = np.flatnonzero(key[order][1:] == key[order][:-1])
+    rising = (faces < np.roll(faces, -1, axis=1)).ravel()
+    edge = unique_edges(faces)[1].ravel()
+    order = np.argsort(edge, kind="stable")
+    same = np.flatnonzero(edge[order][1:] == edge[order][:-1])
     first, second = order[same], order[same + 1]
     a, b = first // 3, second // 3
     turned = rising[first] == rising[second]
@@ -60,17 +59,19 @@ def outward(faces: IntArray, corners: FloatArray) -> FloatArray:
     return np.asarray(np.where(volume[part] < 0, -sign, sign))
 
 
-def smooth_normals(surface: Surface, length: float) -> FloatArray:
-    """(n', 3) unit normals at the vertices of a surface, averaged over about `length`."""
-    mesh = surface.mesh
+def vertex_normals(surface: Surface) -> FloatArray:
+    """(n', 3) unit normals at the vertices of a surface, outward."""
+    mesh, original = surface.mesh, surface.original
     corners = mesh.vertices[mesh.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    original = surface.original
+    of_faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     sign = outward(surface.welded_faces, original.vertices[original.faces])
-    normals *= np.where(surface.face_of >= 0, sign[surface.face_of], 1.0)[:, None]
-    into = indicator(mesh.faces.ravel(), mesh.n_vertices)
-    smooth = smooth_posteriors(mesh, _unit(into @ np.repeat(normals, 3, axis=0)), length)
-    return _unit(np.asarray(smooth, dtype=np.float64))
+    of_faces *= np.where(surface.face_of >= 0, sign[surface.face_of], 1.0)[:, None]
+    return _unit(indicator(mesh.faces.ravel(), mesh.n_vertices) @ np.repeat(of_faces, 3, axis=0))
+
+
+def smooth_normals(surface: Surface, normals: FloatArray, length: float) -> FloatArray:
+    """(n', 3) unit normals, averaged over about `length`."""
+    return _unit(np.asarray(smooth_posteriors(surface.mesh, normals, length), dtype=np.float64))
 
 
 def curvature_across(surface: Surface, normals: FloatArray, adjacency: FaceAdjacency) -> FloatArray:

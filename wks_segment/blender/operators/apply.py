@@ -30,6 +30,7 @@ class WKS_SEGMENT_OT_apply(feedback.AsksFirst, bpy.types.Operator):
         report = tasks.Report([])
         with feedback.cursor_progress(context) as progress:
             model = tasks.stored_model(settings)
+            model.smoothness = settings.smoothness
             with report.stage("read"):
                 report.poses = reader.read_objects(context, group(mesh_objects(context.selected_objects)))
             self.check_limits(context, model, report.poses)
