@@ -28,6 +28,7 @@ CHAIN = [
     "regions",
     "shape",
     "parts",
+    "grouping",
     "model_file",
     "segmentation",
 ]

@@ -185,7 +185,7 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
         raise UserError("apply has nothing to write: give --output, --render or both")
     _check_outputs(options)
     model = _load(options.model)
-    report = Report([], n_segments=model.n_segments)
+    report = Report([], n_segments=model.n_segments_)
     poses = _read(options, report)
     settings = _settings(options)
     if options.smoothness is not None:
@@ -193,7 +193,7 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     tasks.check_limits(model, poses, settings)
     described = tasks.describe(model, poses, report, progress)
     _label(model, poses, described, settings, options, report, progress)
-    settings.keep_model(model, [f"From {options.model.name}", f"{model.n_segments} segments"])
+    settings.keep_model(model, [f"From {options.model.name}", f"{model.n_segments_} segments"])
     if options.output:
         files.save_scene(options.output)
     return _result(options, report)

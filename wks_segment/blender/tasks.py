@@ -148,7 +148,7 @@ def learn(
             model.fit(described, lambda stage, share: progress("Learning the segments", share))
         except ValueError as error:
             raise UserError(f"The segments could not be learned: {error}") from error
-    report.n_segments = model.n_segments
+    report.n_segments = model.n_segments_
     return model, described
 
 
@@ -250,8 +250,8 @@ def filled(labels: IntArray, character: Character) -> IntArray:
 
 def segment_warnings(model: PoseSegmentation, report: Report) -> list[str]:
     """What the user should know of the segments that were found."""
-    lost = model.n_segments - report.n_segments
-    return [f"{lost} of {model.n_segments} segments are gone: all of their parts were too small"] if lost > 0 else []
+    lost = model.n_segments_ - report.n_segments
+    return [f"{lost} of {model.n_segments_} segments are gone: all of their parts were too small"] if lost > 0 else []
 
 
 def pose_warnings(poses: Sequence[Pose], from_frames: bool) -> list[str]:

@@ -27,15 +27,25 @@ VARIANCE_FLOOR = 1e-3
 MAX_ITERATIONS = 200
 TOLERANCE = 1e-4
 """EM ends when the mean log-likelihood rises by less than this in one round."""
-SEEDS = range(10)
+SEEDS = range(6)
 """EM is started by k-means from each of these, on a sketch of the samples; the likeliest mixture is refined on all of
 them. The same in every fit: what comes out is no matter of luck."""
+SAME = 1e-3
+"""Starts whose log-likelihoods differ by less than this share ended in the same mixture."""
 SKETCHED = 0.6
 """Share of the work that the starts are."""
 SKETCH = 4_000
 """Samples in the sketch."""
 ROWS = 65_536
 """Samples in one block of the likelihood."""
+
+
+class TooFewSamplesError(ValueError):
+    """There are fewer different samples than components; `distinct` says how many."""
+
+    def __init__(self, n_components: int, distinct: int) -> None:
+        super().__init__(f"{n_components} components are too many: the samples have only {distinct} distinct values")
+        self.distinct = distinct
 
 
 @dataclass(frozen=True)
@@ -79,7 +89,6 @@ class GaussianMixture:
         return np.asarray(logsumexp(self.log_densities(samples), axis=1))
 
 
-@threadpool_limits.wrap(limits=1)  # on samples this few, threads cost more than they gain
 def fit_mixture(
     samples: FloatArray,
     sample_weights: FloatArray,
@@ -88,7 +97,21 @@ def fit_mixture(
     random_state: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> GaussianMixture:
-    """Fit a mixture to weighted samples by expectation–maximisation, started by k-means.
+    """The likeliest of the mixtures that `fit_mixtures` finds."""
+    return fit_mixtures(samples, sample_weights, n_components, covariance_type, random_state, 1, progress)[0]
+
+
+@threadpool_limits.wrap(limits=1)  # on samples this few, threads cost more than they gain
+def fit_mixtures(
+    samples: FloatArray,
+    sample_weights: FloatArray,
+    n_components: int,
+    covariance_type: CovarianceType = "shared",
+    random_state: int | None = None,
+    keep: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> list[GaussianMixture]:
+    """Fit mixtures to weighted samples by expectation–maximisation, started by k-means.
 
     Parameters
     ----------
@@ -101,15 +124,20 @@ def fit_mixture(
     covariance_type
         See `GaussianMixture`.
     random_state : int, optional
-        None: the best of ten starts, the same ten in every fit, on a sketch that is spread evenly over the samples. A
-        number: one start with this seed, as in the paper.
+        None: six starts, the same six in every fit, on a sketch that is spread evenly over the samples. A number: one
+        start with this seed, as in the paper.
+    keep : int
+        Mixtures to return at most: the likeliest first, refined on all samples. Of starts that ended in the same
+        mixture only one counts.
     progress : callable, optional
         Called with the share of the work that is done, 0 to 1, in every round. An error that it raises ends the work.
 
     Raises
     ------
+    TooFewSamplesError
+        If there are fewer different samples than components.
     ValueError
-        If the covariance type is unknown or there are fewer different samples than components.
+        If the covariance type is unknown.
     """
     if covariance_type not in get_args(CovarianceType):
         raise ValueError(f"covariance_type must be one of {get_args(CovarianceType)}, not {covariance_type!r}")
@@ -134,22 +162,28 @@ def fit_mixture(
             kmeans = KMeans(n_components, n_init=1, random_state=seed)
             start = kmeans.fit_predict(sketch, sample_weight=sketch_shares)
         if len(np.unique(start)) < n_components:
-            raise ValueError(
-                f"{n_components} components are too many: the samples have only {len(np.unique(start))} distinct values"
-            )
+            raise TooFewSamplesError(n_components, len(np.unique(start)))
         candidates.append(
             _maximise_likelihood(
                 sketch, sketch_shares, np.eye(n_components)[start], covariance_type, floor,
                 lambda share, begun=i: tick(SKETCHED * (begun + share) / len(seeds)),  # type: ignore[misc]
             )
         )  # fmt: skip
-    best = max(candidates, key=lambda candidate: candidate[1])[0]
-    refined, _ = _maximise_likelihood(
-        samples, shares, best.posteriors(samples), covariance_type, floor,
-        lambda share: tick(SKETCHED + (1 - SKETCHED) * share),
-    )  # fmt: skip
+    candidates.sort(key=lambda candidate: -candidate[1])
+    different = [
+        candidate
+        for i, candidate in enumerate(candidates)
+        if i == 0 or candidates[i - 1][1] - candidate[1] > SAME * abs(candidate[1])
+    ][:keep]
+    refined = []
+    for i, (candidate, _) in enumerate(different):
+        mixture, _ = _maximise_likelihood(
+            samples, shares, candidate.posteriors(samples), covariance_type, floor,
+            lambda share, begun=i: tick(SKETCHED + (1 - SKETCHED) * (begun + share) / len(different)),  # type: ignore[misc]
+        )  # fmt: skip
+        refined.append(_in_order(mixture))
     tick(1.0)
-    return _in_order(refined)
+    return refined
 
 
 def drawn_evenly(shares: FloatArray, count: int) -> IntArray:

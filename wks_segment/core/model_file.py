@@ -10,11 +10,11 @@ from typing import Any, get_args
 
 import numpy as np
 
-from .mesh import FloatArray
+from .mesh import FloatArray, IntArray
 from .mixture import CovarianceType
 
 FORMAT = "wks_segment model"
-VERSION = 1
+VERSION = 2
 PARAMETERS = (
     "n_segments", "covariance_type", "n_eigenpairs", "n_energies", "accuracy", "random_state", "scaling",
     "pieces", "laplacian", "smoothness", "preset",
@@ -24,6 +24,7 @@ LARGEST = {"n_segments": 1000, "n_eigenpairs": 5000, "n_energies": 1000}
 LEAST, MOST = 1e-6, 1e6
 """Sizes of numbers in a model: spreads lie between them, their squares bound variances. Beyond, single precision would
 lose a signature's digits, or overflow."""
+MOST_COMPONENTS = 1100
 MAX_BYTES = 20 * 2**20
 """A file above this is not read, nor written: what is in there could take longer than a second. 64 segments with
 diagonal covariances take 300 kB, 8 with full ones 2 MB."""
@@ -33,7 +34,9 @@ class ModelFileError(ValueError):
     """The file or text is not a model that this version can read; the message says why."""
 
 
-def encode(parameters: dict[str, Any], arrays: dict[str, FloatArray], covariance_type: CovarianceType) -> str:
+def encode(
+    parameters: dict[str, Any], arrays: dict[str, FloatArray | IntArray], covariance_type: CovarianceType
+) -> str:
     """JSON text of a model."""
     content = {
         "format": FORMAT,
@@ -64,7 +67,8 @@ def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], Covariance
     for name, most in LARGEST.items():
         if isinstance(parameters[name], int) and parameters[name] > most:
             raise ModelFileError(f"the model is damaged: {name} is {parameters[name]}, more than {most}")
-    k, d = parameters["n_segments"], parameters["n_energies"]
+    k, d = _n_components(content, parameters["n_segments"]), parameters["n_energies"]
+    grouped = {} if parameters["preset"] == "paper" else {"joins": (k - 1, 2), "certainties": (k,), "by_chance": (k,)}
     shapes = {"shared": (d,), "diag": (k, d), "spherical": (k,), "tied": (d, d), "full": (k, d, d)}
     if covariance_type not in get_args(CovarianceType):
         raise ModelFileError(f"the model is damaged: unknown covariance type {covariance_type!r}")
@@ -72,8 +76,11 @@ def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], Covariance
         name: _array(content, name, shape)
         for name, shape in {
             "centre": (d,), "spread": (d,), "weights": (k,), "means": (k, d), "covariances": shapes[covariance_type],
+            **grouped,
         }.items()
     }  # fmt: skip
+    if grouped:
+        _check_joins(arrays["joins"], k)
     for name, array in arrays.items():
         if np.abs(array).max(initial=0) > (MOST**2 if name == "covariances" else MOST):
             raise ModelFileError(f"the model is damaged: {name} has a number of {np.abs(array).max():.3g}, too large")
@@ -91,6 +98,25 @@ def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], Covariance
     if abs(arrays["weights"].sum() - 1) > 1e-6:
         raise ModelFileError("the model is damaged: the weights do not sum to 1")
     return parameters, arrays, covariance_type
+
+
+def _n_components(content: dict[str, Any], n_segments: Any) -> int:
+    """Components of the mixture: as many as weights."""
+    weights = content.get("weights")
+    if not isinstance(weights, list) or len(weights) > MOST_COMPONENTS:
+        raise ModelFileError("the model is damaged: weights is missing, or has too many numbers")
+    if n_segments != "auto" and (not isinstance(n_segments, int) or n_segments > len(weights)):
+        raise ModelFileError(f"the model is damaged: {n_segments} segments of {len(weights)} components")
+    return len(weights)
+
+
+def _check_joins(joins: FloatArray, n_components: int) -> None:
+    """Each join is of two groups that are there, named by their lowest components."""
+    alive = set(range(n_components))
+    for i, j in joins.tolist():
+        if not (i in alive and j in alive and i < j):
+            raise ModelFileError(f"the model is damaged: joins has the pair {i:g}, {j:g}, which cannot be joined")
+        alive.remove(j)
 
 
 def write(path: str | PathLike[str], text: str) -> None:

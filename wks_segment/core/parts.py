@@ -110,13 +110,7 @@ def _grown_together(cut: FloatArray, touch: BoolArray, area: FloatArray, gain: f
     count = len(area)
     area, border = area.copy(), cut.sum(axis=1)
 
-    def gains(i: IntArray) -> FloatArray:
-        """Of joining each of some parts with every other."""
-        alone = border[i, None] / area[i, None] + border / area
-        joined = (border[i, None] + border - 2 * cut[i]) / (area[i, None] + area)
-        return np.where(touch[i], alone - joined, -np.inf)
-
-    gained = gains(np.arange(count))
+    gained = np.where(touch, gains_of_joining(cut, border, area), -np.inf)
     owner = np.arange(count)
     for _ in range(count - 1):
         i, j = divmod(int(gained.argmax()), count)
@@ -132,9 +126,20 @@ def _grown_together(cut: FloatArray, touch: BoolArray, area: FloatArray, gain: f
         cut[j, j], touch[j, j] = 0, False
         border[j], border[i] = cut[j].sum(), 0
         gained[i] = gained[:, i] = -np.inf
-        gained[j] = gains(np.array([j]))[0]
+        gained[j] = np.where(touch[j], gains_of_joining(cut, border, area, np.array([j]))[0], -np.inf)
         gained[:, j] = gained[j]
     return owner
+
+
+def gains_of_joining(cut: FloatArray, border: FloatArray, area: FloatArray, rows: IntArray | None = None) -> FloatArray:
+    """(len(rows), r) by how much the sum of border by area falls if each of some parts (None: all) is joined with each.
+
+    `cut` holds the (r, r) weighted borders between parts, `border` the (r,) whole border of each.
+    """
+    some = slice(None) if rows is None else rows
+    alone = (border / area)[some, None] + border / area
+    joined = (border[some, None] + border - 2 * cut[some]) / (area[some, None] + area)
+    return np.asarray(alone - joined)
 
 
 def _patches(surface: Surface, adjacency: FaceAdjacency, curvature: FloatArray) -> IntArray:

@@ -19,11 +19,12 @@ from scipy.sparse import diags
 from threadpoolctl import threadpool_limits
 
 from . import model_file
+from .grouping import Contacts, Ground, Grouping
 from .intrinsic import Laplacian, better_triangles
 from .laplacian import unit_area_masses
 from .memory import available_memory
 from .mesh import FloatArray, IntArray, TriangleMesh
-from .mixture import CovarianceType, GaussianMixture, drawn_evenly, fit_mixture
+from .mixture import CovarianceType, GaussianMixture, TooFewSamplesError, drawn_evenly, fit_mixtures
 from .parts import parts
 from .regions import FaceAdjacency, connected_regions, merge_crumbs, smooth_posteriors
 from .signature import wave_kernel_signature_of
@@ -43,9 +44,17 @@ PROGRESS_SECONDS = 0.1
 """Time between two reports of progress."""
 BESIDE_EIGENPAIRS = 1.5
 """Time of the whole job in that of its eigenpairs, about."""
-MOST = 0.9
-"""Share of the work that is not the mixture."""
-SIGNATURE_OFFSET = 0.1
+MOST = 0.8
+"""Share of the work that is signatures."""
+MIXED = 0.9
+"""Share of the work when the mixture is fitted."""
+AUTO: tuple[CovarianceType, ...] = ("shared", "diag")
+"""Covariances among which `covariance_type="auto"` chooses."""
+CANDIDATES = 3
+"""Mixtures of each covariance whose groups are compared."""
+COMPONENTS, PER_SEGMENT, MOST_MORE = 24, 3, 64
+"""Components of the mixture: at least so many, and so many for each segment, but at most so many more than segments."""
+SIGNATURE_OFFSET = 1.0
 """Added to the signature, whose mean is 1, before its logarithm: smaller values change much from pose to pose and say
 little, and tiny loose parts take no part in low energies."""
 MOST_SMOOTHNESS = 10
@@ -87,11 +96,13 @@ class PoseSegmentation:
 
     Parameters
     ----------
-    n_segments : int
-        Components of the mixture. One component can be several connected parts, as both hands.
+    n_segments : int or "auto"
+        Parts to find, where left and right count as one. A segment is a group of components of the mixture; with the
+        paper's setting each component is one. "auto": as many as are nearly as certain as any number, see
+        `Grouping.best_number`; not for the paper's setting.
     covariance_type : "auto", "shared", "diag", "full", "tied" or "spherical"
-        "shared" is one diagonal covariance for all components, the paper's remark and the most robust on poses and
-        people that were not learned from; "auto" takes it.
+        "shared" is one diagonal covariance for all components, the paper's remark. "auto" tries "shared" and "diag"
+        and takes what is surest of its segments, which foretells how well unseen poses agree (see `Grouping`).
     n_eigenpairs : int
         Eigenpairs of each pose, without the zero modes of further components.
     n_energies : int
@@ -116,14 +127,18 @@ class PoseSegmentation:
     Attributes
     ----------
     mixture_ : GaussianMixture
-        In the space of centred and scaled signatures.
+        In the space of centred and scaled signatures, with K components.
+    grouping_ : Grouping or None
+        In which order components make segments; None with the paper's setting.
+    n_segments_ : int
+        Segments found.
     centre_, spread_ : (n_energies,) arrays
         Mean and standard deviation of the training signatures over the area.
     """
 
     def __init__(
         self,
-        n_segments: int = 8,
+        n_segments: int | Literal["auto"] = 8,
         covariance_type: Literal["auto"] | CovarianceType = "auto",
         n_eigenpairs: int = 300,
         n_energies: int = 100,
@@ -302,7 +317,7 @@ class PoseSegmentation:
         poses = [described.get(i) or self._described(mesh) for i, mesh in enumerate(meshes)]
         tick("mixture", MOST)
         weights = np.concatenate([unit_area_masses(pose.surface.mesh) for pose in poses])
-        if self.n_segments > len(weights):
+        if self._least_components() > len(weights):
             raise ValueError(f"n_segments is {self.n_segments}, but the poses have only {len(weights)} vertices")
         shares = weights / weights.sum()
         signatures = [pose.signature for pose in poses]
@@ -319,24 +334,21 @@ class PoseSegmentation:
         self.spread_ = np.maximum(np.sqrt(shares @ (samples - self.centre_) ** 2), model_file.LEAST)
         if self.preset == "paper":
             self.spread_ = np.ones_like(self.spread_)
-        covariance_type = self._setting("covariance_type")
-        self.mixture_ = fit_mixture(
-            (samples - self.centre_) / self.spread_,
-            shares,
-            self.n_segments,
-            "shared" if covariance_type == "auto" else covariance_type,
-            self.random_state if self.preset == "paper" else None,
-            lambda share: tick("mixture", MOST + (1 - MOST) * share),
-        )
+        samples = (samples - self.centre_) / self.spread_
+        mixtures = self._mixtures(samples, shares, lambda share: tick("mixture", MOST + (MIXED - MOST) * share))
+        self.mixture_ = mixtures[0]
+        self.grouping_: Grouping | None = None
+        if self.preset != "paper":
+            self._group(poses, mixtures, lambda share: tick("parts", MIXED + (1 - MIXED) * share))
         tick("done", 1.0)
         return self
 
     def predict(self, mesh: TriangleMesh | PoseSignature) -> IntArray:
-        """(n,) component of each vertex: the one with the highest posterior, as in the paper."""
+        """(n,) segment of each vertex: the one with the highest posterior, as in the paper."""
         return np.asarray(self.predict_proba(mesh).argmax(axis=1))
 
     def predict_proba(self, mesh: TriangleMesh | PoseSignature) -> FloatArray:
-        """(n, n_segments) posterior of each component at each vertex; rows sum to 1."""
+        """(n, n_segments) posterior of each segment at each vertex; rows sum to 1."""
         self._fitted()
         pose = self._described(mesh)
         return pose.surface.to_vertices(self._posteriors(pose))
@@ -381,7 +393,7 @@ class PoseSegmentation:
         part, tied = merge_crumbs(cut, original.face_areas, centres, own, self._least_share(min_share))
         region = connected_regions(part, tied)
         # The component that most of a region's area belongs to decides on its number.
-        shares = np.zeros((int(region.max()) + 1, self.n_segments))
+        shares = np.zeros((int(region.max()) + 1, self.n_segments_))
         np.add.at(shares, (region, labels), original.face_areas)
         return np.asarray(np.argsort(np.lexsort((np.arange(len(shares)), shares.argmax(axis=1))))[region])
 
@@ -453,12 +465,18 @@ class PoseSegmentation:
     def to_json(self) -> str:
         """The fitted model as JSON text; ValueError if it is not fitted."""
         mixture = self._fitted()
+        arrays = {
+            "centre": self.centre_, "spread": self.spread_, "weights": mixture.weights, "means": mixture.means,
+            "covariances": mixture.covariances,
+        }  # fmt: skip
+        if self.grouping_ is not None:
+            arrays["joins"] = self.grouping_.pairs
+            arrays |= {"certainties": self.grouping_.certainties, "by_chance": self.grouping_.by_chance}
         return model_file.encode(
             {name: getattr(self, name) for name in model_file.PARAMETERS},
-            {"centre": self.centre_, "spread": self.spread_, "weights": mixture.weights, "means": mixture.means,
-             "covariances": mixture.covariances},
+            arrays,
             mixture.covariance_type,
-        )  # fmt: skip
+        )
 
     @classmethod
     def from_json(cls, text: str) -> PoseSegmentation:
@@ -470,11 +488,21 @@ class PoseSegmentation:
         except (ValueError, TypeError) as error:
             raise model_file.ModelFileError(f"the model has a bad parameter: {error}") from error
         model.centre_, model.spread_ = arrays["centre"], arrays["spread"]
+        model.grouping_ = (
+            Grouping(arrays["joins"].astype(np.int64), arrays["certainties"], arrays["by_chance"])
+            if "joins" in arrays
+            else None
+        )
         model.mixture_ = GaussianMixture(covariance_type, arrays["weights"], arrays["means"], arrays["covariances"])
         return model
 
     def _check_parameters(self) -> None:
-        for name, least in (("n_segments", 1), ("n_eigenpairs", 3), ("n_energies", 2), ("random_state", 0)):
+        least_of = {"n_segments": 1, "n_eigenpairs": 3, "n_energies": 2, "random_state": 0}
+        if self.n_segments == "auto":
+            if self.preset == "paper":
+                raise ValueError('n_segments must be a number with preset="paper": "auto" needs the default preset')
+            del least_of["n_segments"]
+        for name, least in least_of.items():
             value = getattr(self, name)
             if not isinstance(value, int | np.integer) or value < least:
                 raise ValueError(f"{name} must be a whole number of at least {least}, not {value!r}")
@@ -529,9 +557,64 @@ class PoseSegmentation:
         scaled = self._scaled(signature)  # a new array, or the signature itself; in its own precision
         return np.asarray((scaled - self.centre_.astype(scaled.dtype)) / self.spread_.astype(scaled.dtype))
 
-    def _posteriors(self, pose: PoseSignature) -> FloatArray:
+    def _mixtures(
+        self, samples: FloatArray, shares: FloatArray, tick: Callable[[float], None]
+    ) -> list[GaussianMixture]:
+        """Mixtures that may do."""
+        wanted, covariance_type = self._least_components(), self._setting("covariance_type")
+        if self.preset == "paper":
+            return fit_mixtures(samples, shares, wanted, covariance_type, self.random_state, 1, tick)
+        types = AUTO if covariance_type == "auto" else (covariance_type,)
+        n_components = min(max(COMPONENTS, PER_SEGMENT * wanted), wanted + MOST_MORE, len(samples))
+        found = []
+        for i, each in enumerate(types):
+
+            def part(share: float, begun: int = i) -> None:
+                tick((begun + share) / len(types))
+
+            try:
+                found += fit_mixtures(samples, shares, n_components, each, None, CANDIDATES, part)
+            except TooFewSamplesError as error:
+                # A cube has three different vertices at most: no more components than that.
+                n_components = max(wanted, error.distinct)
+                found += fit_mixtures(samples, shares, n_components, each, None, CANDIDATES, part)
+        return found
+
+    def _group(
+        self, poses: Sequence[PoseSignature], mixtures: list[GaussianMixture], tick: Callable[[float], None]
+    ) -> None:
+        """Keep the mixture whose groups are the most certain, and its grouping."""
+        contacts: list[list[Contacts]] = [[] for _ in mixtures]
+        for i, pose in enumerate(poses):
+            tick(i / len(poses))
+            ground, standardised = Ground.of(pose.surface), self._standardised(pose.signature)
+            for mixture, found in zip(mixtures, contacts, strict=True):
+                smooth = smooth_posteriors(pose.surface.mesh, mixture.posteriors(standardised), SMOOTHING_LENGTH)
+                found.append(Contacts.on(ground, pose.surface.to_faces(smooth)))
+        groupings = [Grouping.of(Contacts.mean(found)) for found in contacts]
+        certainties = [grouping.certainties[self._number(grouping) - 1] for grouping in groupings]
+        best = int(np.argmax(certainties))
+        self.mixture_, self.grouping_ = mixtures[best], groupings[best]
+
+    def _least_components(self) -> int:
+        return 2 if isinstance(self.n_segments, str) else self.n_segments
+
+    def _number(self, grouping: Grouping) -> int:
+        return grouping.best_number() if isinstance(self.n_segments, str) else self.n_segments
+
+    @property
+    def n_segments_(self) -> int:
+        """Segments of the fitted model."""
         mixture = self._fitted()
-        return mixture.posteriors(self._standardised(pose.signature))
+        return len(mixture.weights) if self.grouping_ is None else self._number(self.grouping_)
+
+    def _posteriors(self, pose: PoseSignature) -> FloatArray:
+        """(n', n_segments_) sums of the posteriors of each segment's components."""
+        posteriors = self._fitted().posteriors(self._standardised(pose.signature))
+        if self.grouping_ is None:
+            return posteriors
+        group = self.grouping_.groups(self.n_segments_)
+        return np.asarray(posteriors @ np.eye(self.n_segments_, dtype=posteriors.dtype)[group])
 
     @threadpool_limits.wrap(limits=1, user_api="blas")  # on arrays this small, threads wait for each other
     def _clean(
@@ -547,7 +630,7 @@ class PoseSegmentation:
         if polygons is None:
             polygons = [np.arange(pose.surface.original.n_faces) for pose in poses]
         n_polygons = 1 + max(int(polygon_of.max()) for polygon_of in polygons)
-        posteriors = np.zeros((n_polygons, self.n_segments))
+        posteriors = np.zeros((n_polygons, self.n_segments_))
         areas, centres, poses_seen = np.zeros(n_polygons), np.zeros((n_polygons, 3)), np.zeros(n_polygons)
         borders = []
         for pose, polygon_of in zip(poses, polygons, strict=True):

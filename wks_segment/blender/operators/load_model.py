@@ -28,6 +28,6 @@ class WKS_SEGMENT_OT_load_model(bpy.types.Operator, ImportHelper):
         except (ModelFileError, OSError) as error:
             self.report({"ERROR"}, f"{path.name} was not loaded: {error}")
             return {"CANCELLED"}
-        context.scene.wks_segment.keep_model(model, [f"From {path.name}", f"{model.n_segments} segments"])
-        self.report({"INFO"}, f"Loaded a model of {model.n_segments} segments from {path.name}")
+        context.scene.wks_segment.keep_model(model, [f"From {path.name}", f"{model.n_segments_} segments"])
+        self.report({"INFO"}, f"Loaded a model of {model.n_segments_} segments from {path.name}")
         return {"FINISHED"}

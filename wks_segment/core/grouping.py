@@ -1,0 +1,164 @@
+"""Segments as groups of mixture components that long, unmarked borders hold together.
+
+A mixture with as many components as segments cuts where the signature's values happen to cluster; a finer one also has
+the borders that a person would draw, among others. Its components are joined, pair by pair, across the border that is
+longest for the smaller side's area, where a border counts little along creases and where the thickness changes: what
+is left are few short borders, which move little from pose to pose. After Hennig, "Methods for merging Gaussian mixture
+components" (2010), with the surface's own geometry in the place of the densities' overlap.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .mesh import FloatArray, IntArray
+from .parts import border_weights, gains_of_joining
+from .regions import FaceAdjacency, merge_crumbs
+from .surface import Surface
+
+LEAST_SHARE = 0.01
+"""Groups under this share of the area are joined first: they would take the place of a part."""
+LEAST_REGION = 0.002
+"""Connected regions under this share of the area have no say in the borders."""
+EMPTY = 1e-6
+"""Area that a component without any counts as."""
+
+
+BEST_WITHIN, MOST_SEGMENTS = 0.06, 16
+"""The number of segments, where it is left open: the most, up to this many, that are nearly as certain as any."""
+
+
+@dataclass(frozen=True)
+class Ground:
+    """One pose, on which components lie.
+
+    Attributes
+    ----------
+    surface : Surface
+    adjacency : FaceAdjacency
+        Of the m original faces.
+    lengths : (p,) array
+        Weighted border length between neighbours, for a surface of area 1.
+    """
+
+    surface: Surface
+    adjacency: FaceAdjacency
+    lengths: FloatArray
+
+    @classmethod
+    def of(cls, surface: Surface) -> Ground:
+        """Find the neighbours and weigh their borders."""
+        original = surface.original
+        adjacency = FaceAdjacency.of(surface.welded_faces, original.vertices)
+        weights, _ = border_weights(surface, adjacency)
+        return cls(surface, adjacency, weights * adjacency.lengths / np.sqrt(original.area))
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """How the K components of a mixture lie on poses.
+
+    Attributes
+    ----------
+    borders : (K, K) array
+        Weighted border length between two components, for a surface of area 1.
+    areas : (K,) array
+        Share of the area.
+    overlaps : (K, K) array
+        Share of the area that both claim: Σ over faces of area times both posteriors.
+    """
+
+    borders: FloatArray
+    areas: FloatArray
+    overlaps: FloatArray
+
+    @classmethod
+    def on(cls, ground: Ground, posteriors: FloatArray) -> Contacts:
+        """Of one pose, given (m, K) smoothed posteriors of its faces."""
+        n_components = posteriors.shape[1]
+        original, adjacency = ground.surface.original, ground.adjacency
+        centres = original.vertices[original.faces].mean(axis=1)
+        labels, _ = merge_crumbs(posteriors.argmax(axis=1), original.face_areas, centres, adjacency, LEAST_REGION)
+        shares = original.face_areas / original.area
+        a, b = labels[adjacency.pairs].T
+        borders, areas = np.zeros((n_components, n_components)), np.zeros(n_components)
+        np.add.at(borders, (a, b), ground.lengths * (a != b))
+        np.add.at(areas, labels, shares)
+        return cls(borders + borders.T, areas, np.asarray(posteriors.T @ (posteriors * shares[:, None])))
+
+    @classmethod
+    def mean(cls, poses: list[Contacts]) -> Contacts:
+        """Of several poses, each as much as the others."""
+        return cls(*(np.mean([getattr(pose, name) for pose in poses], axis=0) for name in cls.__dataclass_fields__))
+
+
+@dataclass(frozen=True)
+class Grouping:
+    """In which order K components are joined.
+
+    Attributes
+    ----------
+    pairs : (K − 1, 2) array of int
+        The groups that are joined in turn, each named by its lowest component, lower first.
+    certainties : (K,) array
+        With 1, 2, … K groups, how sure faces are of their group: Σ over faces of area times the squares of the
+        posteriors, which is low where wide borders are long. It foretells how well unseen poses will agree.
+    by_chance : (K,) array
+        What that would be if only the groups' sizes were known.
+    """
+
+    pairs: IntArray
+    certainties: FloatArray
+    by_chance: FloatArray
+
+    @classmethod
+    def of(cls, contacts: Contacts) -> Grouping:
+        """Join the components of a mixture, best pair first, until one group is left."""
+        borders, overlaps = contacts.borders.copy(), contacts.overlaps.copy()
+        areas = np.maximum(contacts.areas, EMPTY)
+        count = len(areas)
+        alive = np.ones(count, dtype=bool)
+        pairs, certainties, by_chance = np.zeros((count - 1, 2), dtype=np.int64), np.ones(count), np.ones(count)
+        for step in range(count - 1):
+            certainties[count - 1 - step] = np.trace(overlaps)
+            by_chance[count - 1 - step] = np.square(overlaps.sum(axis=1)).sum()
+            np.fill_diagonal(borders, 0)
+            gain = gains_of_joining(borders, borders.sum(axis=1), areas)
+            touch = borders > 0
+            small = np.minimum(areas[:, None], areas) < LEAST_SHARE
+            # The small before the large, then what touches before what does not; each of these outweighs the rest.
+            rank = 4.0 * small + 2.0 * touch + np.where(touch, gain / (1 + np.abs(gain)), overlaps)
+            rank[~np.triu(alive[:, None] & alive, 1)] = -np.inf
+            i, j = divmod(int(rank.argmax()), count)
+            pairs[step] = i, j
+            for table in (borders, overlaps):
+                table[i] += table[j]
+                table[:, i] += table[:, j]
+                table[j] = table[:, j] = 0
+            areas[i] += areas[j]
+            alive[j] = False
+        return cls(pairs, certainties, by_chance)
+
+    def groups(self, n_groups: int) -> IntArray:
+        """(K,) group of each component after as many joins as leave `n_groups`, numbered by their lowest component."""
+        owner = np.arange(len(self.certainties))
+        for i, j in self.pairs[: len(owner) - n_groups]:
+            owner[owner == j] = i
+        return np.asarray(np.unique(owner, return_inverse=True)[1])
+
+    def curve(self) -> FloatArray:
+        """(K,) certainty of 1, 2, … K groups beyond chance: 1 where all are sure, 0 where only sizes are known.
+
+        As Cohen's kappa does for agreement, so that numbers of groups can be compared; 0 for one group.
+        """
+        beyond = 1 - self.by_chance
+        return np.asarray((self.certainties - self.by_chance) / np.where(beyond > 0, beyond, 1))
+
+    def best_number(self) -> int:
+        """The most groups that are nearly as certain as any; 2 at least, if there are so many components."""
+        curve = self.curve()[1:MOST_SEGMENTS]
+        if not len(curve):
+            return 1
+        return 2 + int(np.flatnonzero(curve >= curve.max() - BEST_WITHIN)[-1])
