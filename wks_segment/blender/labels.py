@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..core.mesh import FloatArray, IntArray
 from .palette import colors_of, linear
-from .vertex_groups import active_group, remove_groups, write_groups
+from .vertex_groups import active_group, free_name, remove_groups, write_groups
 
 FACES = "wks_segment"
 VERTICES = "wks_segment_vertex"
@@ -84,7 +84,7 @@ def has_labels(mesh: bpy.types.Mesh) -> bool:
 
 def _write_ints(mesh: bpy.types.Mesh, key: str, name: str, domain: str, values: NDArray[np.integer[Any]]) -> None:
     """Add an int attribute and note the name that it got: a name that is taken gets a number."""
-    attribute = mesh.attributes.new(name, "INT", domain)
+    attribute = mesh.attributes.new(free_name(mesh, name), "INT", domain)
     mesh[NOTE][key] = attribute.name
     attribute.data.foreach_set("value", np.asarray(values, dtype=np.int32))
 
@@ -106,7 +106,7 @@ def _at_corners(mesh: bpy.types.Mesh, labels: IntArray) -> IntArray:
 
 def _write_colors(mesh: bpy.types.Mesh, labels: IntArray) -> None:
     # Corners, since colors of the FACE domain cannot be shown, and those of points would blend.
-    attribute = mesh.color_attributes.new(COLORS, "BYTE_COLOR", "CORNER")
+    attribute = mesh.color_attributes.new(free_name(mesh, COLORS), "BYTE_COLOR", "CORNER")
     mesh[NOTE]["colors"] = attribute.name
     colors = np.ones((len(mesh.loops), 4), dtype=np.float32)
     colors[:, :3] = colors_of(_at_corners(mesh, labels))

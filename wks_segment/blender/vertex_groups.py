@@ -61,6 +61,12 @@ def active_group(mesh: bpy.types.Mesh) -> str | None:
         return None if active is None else active.name
 
 
+def free_name(mesh: bpy.types.Mesh, name: str) -> str:
+    """The name, or with a number if an attribute or a vertex group has it."""
+    with _holder(mesh) as holder:
+        return _free_name(holder, name)
+
+
 @contextmanager
 def _holder(mesh: bpy.types.Mesh) -> Iterator[bpy.types.Object]:
     """An object of the mesh, for as long as it lasts: groups belong to the mesh, but are reached through objects."""
@@ -72,7 +78,8 @@ def _holder(mesh: bpy.types.Mesh) -> Iterator[bpy.types.Object]:
 
 
 def _free_name(holder: bpy.types.Object, name: str) -> str:
-    """The name, or with a number if it is taken; Blender itself numbers for other groups, but not for attributes."""
+    # Blender numbers among groups and among attributes, but not between them: it makes no attribute with the name of a
+    # group, and lets a group take that of an attribute.
     taken = {*holder.vertex_groups.keys(), *holder.data.attributes.keys()}
     return next(free for free in chain([name], (f"{name}.{i:03}" for i in count(1))) if free not in taken)
 
