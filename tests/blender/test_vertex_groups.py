@@ -182,19 +182,25 @@ def test_modifier_that_uses_a_group_of_ours_sees_new_weights_at_once():
     assert shown() == 600
 
 
-def test_groups_of_several_objects_of_one_character(settings):
-    body = limbed_rigged("Body")
-    hat = mesh_object(
-        [(0, 0, 1.5), (1, 0, 1.5), (0, 1, 1.5), (0, 0, 2)], [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)], "Hat"
-    )
-    hat.parent = body.parent
-    hat.modifiers.new("Subdivision", "SUBSURF")
-    for kind in ("hard", "soft"):
-        learned(settings, kind, body, hat)
-        for obj in (body, hat):
-            sums = weights_of(obj).sum(axis=1)
-            np.testing.assert_allclose(sums if kind == "soft" else np.minimum(sums, 1), 1, atol=1e-6)
-    assert 1 <= len(ours(hat)) <= len(ours(body)) == 4
+@pytest.mark.parametrize("with_modifier", [(), (0,), (1,), (0, 1)])
+def test_each_object_of_a_character_gets_its_own_weights(settings, with_modifier):
+    body, child = limbed_rigged("Body"), limbed("Child", 0.4, subdivisions=3)
+    child.parent = body.parent
+    child.location.x = 6
+    for i in with_modifier:
+        (body, child)[i].modifiers.new("Solidify", "SOLIDIFY").thickness = 0.01
+    learned(settings, "hard", body, child)
+    assert "1 pose" in settings.model_summary, "they are not one character"
+    for obj in (body, child):
+        hard = weights_of(obj)
+        assert set(np.unique(hard)) == {0, 1}
+        assert hard.any(axis=1).all()
+    learned(settings, "soft", body, child)
+    for obj in (body, child):
+        weights = weights_of(obj)
+        np.testing.assert_allclose(weights.sum(axis=1), 1, atol=1e-6)
+        columns = np.array([int(name.split()[-1]) - 1 for name in ours(obj)])
+        assert (columns[weights.argmax(axis=1)] == numbers(obj.data, "wks_segment_vertex")).mean() > 0.8
     assert body.vertex_groups.keys()[:2] == ["root", "limb"]
 
 
