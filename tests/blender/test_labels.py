@@ -172,6 +172,21 @@ def test_attribute_of_the_artist_with_our_name_survives(mesh, name, kind, domain
     assert not changes(before, snapshot(mesh))
 
 
+def test_vertex_groups_of_the_artist_with_our_names_survive(mesh):
+    obj = bpy.data.objects["Limbed"]
+    names = ["wks_segment", "wks_segment_vertex", "wks_segment_color", "wks_segment_own_material"]
+    for name in names:
+        obj.vertex_groups.new(name=name).add([1, 2], 0.5, "REPLACE")
+    before, labels = snapshot(mesh), stripes(mesh)
+    for _ in range(2):
+        write_labels(mesh, labels, materials=True)
+        np.testing.assert_array_equal(read_labels(mesh), labels)
+        assert obj.vertex_groups.keys() == names
+        assert {f"{name}.001" for name in names} < set(mesh.attributes.keys())
+    clear_labels(mesh)
+    assert not changes(before, snapshot(mesh))
+
+
 def test_property_of_the_artist_with_our_name_survives(mesh):
     mesh["wks_segment"] = 3.5
     labels = stripes(mesh)

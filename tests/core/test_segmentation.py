@@ -43,6 +43,25 @@ def test_posteriors_are_probabilities_and_the_label_is_the_largest(model):
     np.testing.assert_array_equal(model.predict(described), posteriors.argmax(axis=1))
 
 
+def test_soft_posteriors_are_probabilities_that_change_less_from_vertex_to_vertex(model):
+    described = model.describe(POSES[0])
+    plain, soft = model.predict_proba(described), model.predict_soft(described)
+    assert soft.shape == plain.shape
+    assert soft.min() >= 0
+    np.testing.assert_allclose(soft.sum(axis=1), 1.0)
+    edges = POSES[0].faces[:, :2]
+    steps = [((of[edges[:, 0]] - of[edges[:, 1]]) ** 2).sum() for of in (plain, soft)]
+    assert steps[1] < 0.5 * steps[0]
+    assert (soft.argmax(axis=1) == plain.argmax(axis=1)).mean() > 0.9
+
+
+def test_soft_posteriors_without_smoothness_are_those_of_the_signature(model):
+    described = model.describe(POSES[0])
+    rough = PoseSegmentation.from_json(model.to_json())
+    rough.smoothness = 0.0
+    np.testing.assert_allclose(rough.predict_soft(described), model.predict_proba(described), rtol=1e-9)
+
+
 def test_parts_are_connected_and_not_too_small(model):
     described = model.describe(POSES[2])
     regions = model.segment_regions(described)

@@ -39,6 +39,8 @@ OPTIONS = {
     "--preset": "preset",
 }
 """Options that are settings: their text, limits and defaults come from the property group."""
+OUTPUT_OPTIONS = {"--vertex-groups": "vertex_groups"}
+"""The same for commands that write labels."""
 
 
 def run(arguments: list[str]) -> int:
@@ -90,7 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     show.add_argument("--learn", type=int, default=4, help="poses to learn from (default: 4)")
     show.add_argument("--unseen", type=int, default=4, help="poses to check on (default: 4)")
     show.add_argument("--action", help="name of the action to take the poses from")
-    _add_settings(show)
+    _add_settings(show, OPTIONS | OUTPUT_OPTIONS)
     show.set_defaults(run=_demo)
 
     for command in (segment, learn, apply, show):
@@ -116,10 +118,11 @@ def _add_outputs(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--output", type=Path, help=f"write the scene to this file ({', '.join(files.EXPORTERS)})")
     parser.add_argument("--render", type=Path, metavar="PNG", help="write a picture of all poses side by side")
     parser.add_argument("--materials", action="store_true", help="also write a material for each segment")
+    _add_settings(parser, OUTPUT_OPTIONS)
 
 
-def _add_settings(parser: argparse.ArgumentParser) -> None:
-    for option, name in OPTIONS.items():
+def _add_settings(parser: argparse.ArgumentParser, options: dict[str, str] = OPTIONS) -> None:
+    for option, name in options.items():
         _add_setting(parser, option, name)
 
 
@@ -286,7 +289,7 @@ def _settings(options: argparse.Namespace) -> WKSSegmentSettings:
     """Default settings, whatever the file holds, with what the command line says."""
     settings: WKSSegmentSettings = bpy.context.scene.wks_segment
     settings.property_unset("write_colors")
-    for name in OPTIONS.values():
+    for name in (OPTIONS | OUTPUT_OPTIONS).values():
         settings.property_unset(name)
         value = getattr(options, name, None)
         if value is not None:
@@ -301,7 +304,8 @@ def _label(
 ) -> None:  # fmt: skip
     labels = tasks.label(model, poses, described, settings, report, progress)
     if options.output:
-        tasks.write(labels, settings, report)
+        soft = tasks.soften(model, poses, described, settings, report, progress)
+        tasks.write(labels, settings, report, soft)
     if options.render:
         with report.stage("render"):
             render_poses([Tile(pose, labels[pose.character], pose.name) for pose in poses], options.render)

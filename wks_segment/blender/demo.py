@@ -70,7 +70,8 @@ def run(
     tasks.check_limits(settings.new_model(), poses, settings)
     model, described = tasks.learn(training, settings, report, lambda stage, done: progress(stage, 0.5 * done))
     together = tasks.label(model, training, described, settings, report, lambda stage, done: progress(stage, 0.5))
-    tasks.write(together, settings, report)
+    soft = tasks.soften(model, training, described, settings, report, lambda stage, done: progress(stage, 0.5))
+    tasks.write(together, settings, report, soft)
 
     def later(stage: str, done: float) -> None:
         progress(stage, 0.5 + 0.4 * done)

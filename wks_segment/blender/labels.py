@@ -8,8 +8,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.mesh import IntArray
+from ..core.mesh import FloatArray, IntArray
 from .palette import colors_of, linear
+from .vertex_groups import active_group, free_name, remove_groups, write_groups
 
 FACES = "wks_segment"
 VERTICES = "wks_segment_vertex"
@@ -17,17 +18,22 @@ COLORS = "wks_segment_color"
 OWN_MATERIALS = "wks_segment_own_material"
 """Face attribute that keeps the material index of each face from before ours."""
 NOTE = "wks_segment_note"
-"""Custom property of a mesh: which attributes are ours, and what was active before."""
+"""Custom property of a mesh: which attributes and vertex groups are ours, and what was active before."""
 COMPONENT = "wks_segment_component"
 """Custom property of our materials: the component that they show."""
 
 
-def write_labels(mesh: bpy.types.Mesh, labels: IntArray, colors: bool = True, materials: bool = False) -> None:
+def write_labels(
+    mesh: bpy.types.Mesh, labels: IntArray, colors: bool = True, materials: bool = False,
+    weights: FloatArray | None = None,
+) -> None:  # fmt: skip
     """Write (p,) components of polygons to a mesh, in the place of what an earlier run wrote.
 
     Faces and vertices get an int attribute each; optionally a color attribute of the corners, and material slots
-    behind the mesh's own. Attributes of the user that happen to have our names are left alone: ours get a number.
+    behind the mesh's own, and a vertex group for each column of (n, k) weights that is not all 0. Attributes and
+    groups of the user that happen to have our names are left alone: ours get a number.
     """
+    shown = None if weights is None else active_group(mesh)
     clear_labels(mesh)
     # The note comes first and grows with what is written, so that Clear also mends a run that broke off.
     mesh[NOTE] = {}
@@ -44,6 +50,8 @@ def write_labels(mesh: bpy.types.Mesh, labels: IntArray, colors: bool = True, ma
         mesh.polygons.foreach_get("material_index", before)
         _write_ints(mesh, "own_materials", OWN_MATERIALS, "FACE", before)
         _write_materials(mesh, labels)
+    if weights is not None:
+        write_groups(mesh, weights, mesh[NOTE], shown)
     mesh.update()
 
 
@@ -63,6 +71,7 @@ def clear_labels(mesh: bpy.types.Mesh) -> bool:
     active = mesh.color_attributes.get(note.get("active_color", ""))
     if active is not None:
         mesh.color_attributes.active_color = active
+    remove_groups(mesh, note)
     del mesh[NOTE]
     mesh.update()
     return True
@@ -75,7 +84,7 @@ def has_labels(mesh: bpy.types.Mesh) -> bool:
 
 def _write_ints(mesh: bpy.types.Mesh, key: str, name: str, domain: str, values: NDArray[np.integer[Any]]) -> None:
     """Add an int attribute and note the name that it got: a name that is taken gets a number."""
-    attribute = mesh.attributes.new(name, "INT", domain)
+    attribute = mesh.attributes.new(free_name(mesh, name), "INT", domain)
     mesh[NOTE][key] = attribute.name
     attribute.data.foreach_set("value", np.asarray(values, dtype=np.int32))
 
@@ -97,7 +106,7 @@ def _at_corners(mesh: bpy.types.Mesh, labels: IntArray) -> IntArray:
 
 def _write_colors(mesh: bpy.types.Mesh, labels: IntArray) -> None:
     # Corners, since colors of the FACE domain cannot be shown, and those of points would blend.
-    attribute = mesh.color_attributes.new(COLORS, "BYTE_COLOR", "CORNER")
+    attribute = mesh.color_attributes.new(free_name(mesh, COLORS), "BYTE_COLOR", "CORNER")
     mesh[NOTE]["colors"] = attribute.name
     colors = np.ones((len(mesh.loops), 4), dtype=np.float32)
     colors[:, :3] = colors_of(_at_corners(mesh, labels))

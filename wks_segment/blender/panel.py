@@ -65,7 +65,7 @@ class WKS_SEGMENT_PT_outputs(_SubPanel, bpy.types.Panel):
     bl_label = "Outputs"
 
     def draw(self, context: bpy.types.Context) -> None:
-        self.settings(context, "write_colors", "write_materials")
+        self.settings(context, "write_colors", "write_materials", "vertex_groups")
 
 
 class WKS_SEGMENT_PT_model(_SubPanel, bpy.types.Panel):

@@ -42,6 +42,9 @@ class Pose:
     polygon_of : (m,) int array
         The polygon that each triangle comes from; the polygons of all objects are numbered one object after another.
         -1: a modifier made it of nothing of the character's own.
+    vertex_of : (n,) int array
+        The character's own vertex that each vertex is, numbered in the same way; -1 where modifiers change faces, so
+        that only `polygon_of` tells what is where.
     rest : TriangleMesh, optional
         The same triangles in the rest position of the character's armature, if it has one: where the artist put loose
         parts together.
@@ -51,6 +54,7 @@ class Pose:
     character: Character
     mesh: TriangleMesh
     polygon_of: IntArray
+    vertex_of: IntArray
     rest: TriangleMesh | None = None
 
     def is_like(self, other: Pose) -> bool:
@@ -69,7 +73,16 @@ class Pose:
 
 def polygon_ranges(character: Character) -> list[tuple[bpy.types.Object, slice]]:
     """Each object with its polygons' place in the character's numbering."""
-    ends = np.cumsum([len(obj.data.polygons) for obj in character.objects]).tolist()
+    return _ranges(character, "polygons")
+
+
+def vertex_ranges(character: Character) -> list[tuple[bpy.types.Object, slice]]:
+    """Each object with its vertices' place in the character's numbering."""
+    return _ranges(character, "vertices")
+
+
+def _ranges(character: Character, of: str) -> list[tuple[bpy.types.Object, slice]]:
+    ends = np.cumsum([len(getattr(obj.data, of)) for obj in character.objects]).tolist()
     starts = [0, *ends[:-1]]
     return [(obj, slice(a, b)) for obj, a, b in zip(character.objects, starts, ends, strict=True)]
 
@@ -170,11 +183,12 @@ def read_pose(context: bpy.types.Context, character: Character, name: str) -> Po
     vertices: list[FloatArray] = []
     triangles: list[IntArray] = []
     owners: list[IntArray] = []
+    own: list[IntArray] = []
     n_vertices = 0
     with _marked_origins(character) as origins:
         depsgraph = context.evaluated_depsgraph_get()
-        for obj, polygons in polygon_ranges(character):
-            points, faces, polygon_of = _read_object(obj, depsgraph, origins.get(obj.data))
+        for (obj, polygons), (_, its) in zip(polygon_ranges(character), vertex_ranges(character), strict=True):
+            points, faces, polygon_of, vertex_of = _read_object(obj, depsgraph, origins.get(obj.data))
             bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
             if bad.size:
                 place = f'vertex {bad[0]} of "{obj.name}"'
@@ -182,6 +196,7 @@ def read_pose(context: bpy.types.Context, character: Character, name: str) -> Po
             vertices.append(points)
             triangles.append(faces + n_vertices)
             owners.append(np.where(polygon_of < 0, -1, polygon_of + polygons.start))
+            own.append(np.where(vertex_of < 0, -1, vertex_of + its.start))
             n_vertices += len(points)
     faces, polygon_of = np.concatenate(triangles), np.concatenate(owners)
     proper = ~repeats_a_vertex(faces)
@@ -194,13 +209,16 @@ def read_pose(context: bpy.types.Context, character: Character, name: str) -> Po
         mesh = TriangleMesh(np.concatenate(vertices), faces[proper])
     except ValueError as error:
         raise UserError(f'"{name}": {error}') from error
-    return Pose(name, character, mesh, polygon_of[proper])
+    return Pose(name, character, mesh, polygon_of[proper], np.concatenate(own))
 
 
 def _read_object(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, origin_name: str | None
-) -> tuple[FloatArray, IntArray, IntArray]:
-    """Vertices in world space, triangles, and the polygon of the object's own mesh that each comes from (-1: none)."""
+) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
+    """Vertices in world space, triangles, and what each is of the object's own mesh (-1: nothing, or not known).
+
+    Gives for each triangle the polygon that it comes from, and for each vertex the vertex.
+    """
     evaluated = obj.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
@@ -208,19 +226,30 @@ def _read_object(
         vertices = _get(mesh.vertices, "co", 3, np.float32).reshape(-1, 3)
         triangles = _get(mesh.loop_triangles, "vertices", 3, np.int32).reshape(-1, 3)
         polygon_of = _get(mesh.loop_triangles, "polygon_index", 1, np.int32)
+        same = _has_corners_of(mesh, obj.data)
         if origin_name is not None and len(mesh.polygons):
             origin = mesh.attributes.get(origin_name)
             if origin is None:
                 raise UserError(
                     f'"{obj.name}": a modifier makes faces and hides of what (as Remesh): apply it, or turn it off'
                 )
-            polygon_of = _get(origin.data, "value", 1, np.int32)[polygon_of] - 1
+            polygons = _get(origin.data, "value", 1, np.int32) - 1
+            same &= np.array_equal(polygons, np.arange(len(obj.data.polygons)))
+            polygon_of = polygons[polygon_of]
         world = np.array(evaluated.matrix_world, dtype=np.float64)
     finally:
         evaluated.to_mesh_clear()
     with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is refused by name
         vertices = vertices @ world[:3, :3].T + world[:3, 3]
-    return vertices, triangles.astype(np.int64), polygon_of.astype(np.int64)
+    vertex_of = np.arange(len(vertices)) if same else np.full(len(vertices), -1)
+    return vertices, triangles.astype(np.int64), polygon_of.astype(np.int64), vertex_of
+
+
+def _has_corners_of(mesh: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:
+    """Whether the corners of two meshes' faces are at the same vertices: those of one are then those of the other."""
+    return len(mesh.vertices) == len(other.vertices) and np.array_equal(
+        _get(mesh.loops, "vertex_index", 1, np.int32), _get(other.loops, "vertex_index", 1, np.int32)
+    )
 
 
 def _get(collection: bpy.types.bpy_prop_collection, name: str, width: int, dtype: type) -> NDArray[Any]:

@@ -149,6 +149,21 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         default=False,
     )
 
+    vertex_groups: EnumProperty(
+        name="Vertex Groups",
+        description="Write a vertex group for each segment, beside the object's own",
+        items=[
+            ("none", "None", "No vertex groups"),
+            (
+                "hard",
+                "Hard",
+                "Weight 1 on each vertex of the segment's faces; on a border, in the groups of both sides",
+            ),
+            ("soft", "Soft", "How probable the segment is at each vertex. The weights of a vertex sum to 1"),
+        ],
+        default="none",
+    )
+
     model: StringProperty(options={"HIDDEN"}, description="The learned model, as JSON")
     model_summary: StringProperty(options={"HIDDEN"}, description="Lines on what the model was learned from")
 

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from ..core import Connection, PoseSegmentation, PoseSignature, SpectrumError, connect
 from ..core.memory import available_memory
-from ..core.mesh import IntArray
+from ..core.mesh import FloatArray, IntArray
 from ..core.segmentation import Progress
 from . import poses as reader
 from .characters import Character, armature_of, group, mesh_objects
@@ -22,6 +22,7 @@ from .errors import TooLargeError, UserError
 from .labels import write_labels
 from .poses import Pose
 from .settings import WKSSegmentSettings
+from .weights import hard_weights, soft_weights
 
 
 @dataclass
@@ -197,9 +198,7 @@ def label(
     labels: dict[Character, IntArray] = {}
     min_share = None if model.preset == "paper" else settings.min_share / 100
     with report.stage("label"):
-        meshes = [tuple(obj.data for obj in pose.character.objects) for pose in poses]
-        for mesh in dict.fromkeys(meshes):
-            mine = [i for i, other in enumerate(meshes) if other == mesh]
+        for mine in of_one_mesh(poses):
             name = poses[mine[0]].character.name
             found = model.segment_polygons(
                 [described[i] for i in mine],
@@ -213,13 +212,43 @@ def label(
     return labels
 
 
-def write(labels: dict[Character, IntArray], settings: WKSSegmentSettings, report: Report) -> None:
-    """Write labels to the objects of each character."""
+def soften(
+    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[PoseSignature],
+    settings: WKSSegmentSettings, report: Report, progress: Progress,
+) -> dict[Character, FloatArray] | None:  # fmt: skip
+    """Weights of each character's vertices, agreed on as labels are; None if the settings ask for no soft groups."""
+    if settings.vertex_groups != "soft":
+        return None
+    weights: dict[Character, FloatArray] = {}
+    with report.stage("label"):
+        for mine in of_one_mesh(poses):
+            progress(f'Weights of "{poses[mine[0]].character.name}"', 1.0)
+            found = soft_weights(model, [poses[i] for i in mine], [described[i] for i in mine])
+            weights |= {poses[i].character: found for i in mine}
+    return weights
+
+
+def of_one_mesh(poses: Sequence[Pose]) -> list[list[int]]:
+    """Indices of poses whose characters share their meshes, together."""
+    meshes = [tuple(obj.data for obj in pose.character.objects) for pose in poses]
+    return [[i for i, other in enumerate(meshes) if other == mesh] for mesh in dict.fromkeys(meshes)]
+
+
+def write(
+    labels: dict[Character, IntArray], settings: WKSSegmentSettings, report: Report,
+    soft: dict[Character, FloatArray] | None = None,
+) -> None:  # fmt: skip
+    """Write labels, and the weights that `soften` gave, to the objects of each character."""
     with report.stage("write"):
         for character, values in labels.items():
-            for obj, polygons in reader.polygon_ranges(character):
-                if polygons.stop > polygons.start:
-                    write_labels(obj.data, values[polygons], settings.write_colors, settings.write_materials)
+            ranges = zip(reader.polygon_ranges(character), reader.vertex_ranges(character), strict=True)
+            for (obj, polygons), (_, vertices) in ranges:
+                if polygons.stop == polygons.start:
+                    continue
+                weights = None if soft is None else soft[character][vertices]
+                if settings.vertex_groups == "hard":
+                    weights = hard_weights(obj.data, values[polygons])
+                write_labels(obj.data, values[polygons], settings.write_colors, settings.write_materials, weights)
 
 
 def stored_model(settings: WKSSegmentSettings) -> PoseSegmentation:

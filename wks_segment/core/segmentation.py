@@ -353,6 +353,19 @@ class PoseSegmentation:
         pose = self._described(mesh)
         return pose.surface.to_vertices(self._posteriors(pose))
 
+    @threadpool_limits.wrap(limits=1, user_api="blas")  # as in _clean
+    def predict_soft(self, mesh: TriangleMesh | PoseSignature) -> FloatArray:
+        """(n, n_segments) posteriors as `predict_proba` has them, smoothed as far as the labels of faces are."""
+        self._fitted()
+        pose = self._described(mesh)
+        posteriors, smoothness = self._posteriors(pose), self._setting("smoothness")
+        if smoothness > 0:
+            smooth = smooth_posteriors(pose.surface.mesh, posteriors, smoothness * SMOOTHING_LENGTH)
+            # Obtuse triangles let the heat flow a little beyond 0 and 1.
+            posteriors = np.clip(smooth, 0, 1).astype(np.float64)
+            posteriors /= posteriors.sum(axis=1, keepdims=True)
+        return pose.surface.to_vertices(posteriors)
+
     def score(self, mesh: TriangleMesh | PoseSignature) -> float:
         """Mean log-likelihood of the signature over the area: how well the model explains a shape (section 5).
 

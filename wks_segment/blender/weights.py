@@ -1,0 +1,106 @@
+"""How much each vertex belongs to each segment: what the vertex groups hold."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.spatial import cKDTree
+
+from ..core import PoseSegmentation, PoseSignature
+from ..core.mesh import BoolArray, FloatArray, IntArray
+from ..core.surface import indicator
+from .characters import Character
+from .poses import Pose, polygon_ranges, vertex_ranges
+
+LEAST = 0.01
+"""Smaller soft weights are left out: nearly every vertex would be in every group."""
+
+
+def hard_weights(mesh: bpy.types.Mesh, labels: IntArray) -> FloatArray:
+    """(n, k) 1 where a vertex is a corner of a polygon with that label, else 0, given the (p,) labels of polygons."""
+    vertices, polygons = _corners(mesh)
+    weights = np.zeros((len(mesh.vertices), int(labels.max()) + 1))
+    weights[vertices, labels[polygons]] = 1.0
+    return weights
+
+
+def soft_weights(
+    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[PoseSignature]
+) -> FloatArray:  # fmt: skip
+    """(n, n_segments) mean posterior, over poses of the same meshes, at each of the character's own vertices.
+
+    Rows sum to 1; weights below `LEAST` are left out. The vertices of all objects are numbered one object after
+    another. One that no pose shows (masked out, say) takes the weights of the nearest one.
+    """
+    means, seen = zip(
+        *(own_vertices(pose, model.predict_soft(of)) for pose, of in zip(poses, described, strict=True)), strict=True
+    )
+    times_seen = np.sum(seen, axis=0)
+    weights = np.sum(means, axis=0) / np.maximum(times_seen, 1)[:, None]
+    unseen = times_seen == 0
+    if unseen.any():
+        places = _places(poses[0].character)
+        weights[unseen] = weights[~unseen][cKDTree(places[~unseen]).query(places[unseen])[1]]
+    # Among very many segments, the largest can be small too.
+    weights[(weights < LEAST) & (weights < weights.max(axis=1, keepdims=True))] = 0
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+
+
+def own_vertices(pose: Pose, values: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Carry (n', k) values at the vertices of a pose to the (n, k) own ones of its character, and which are seen.
+
+    Where modifiers change faces, only polygons are known: a vertex gets the mean over the polygons around it, by area.
+    Rows of vertices that are not seen are 0.
+    """
+    n_vertices = vertex_ranges(pose.character)[-1][1].stop
+    own, seen = np.zeros((n_vertices, values.shape[1])), np.zeros(n_vertices, dtype=bool)
+    known = np.flatnonzero(pose.vertex_of >= 0)
+    own[pose.vertex_of[known]] = values[known]
+    seen[pose.vertex_of[known]] = True
+    if seen.all():
+        return own, seen
+    around = _around(pose.character)
+    of_polygon = indicator(pose.polygon_of, around.shape[1])
+    # A polygon without area still speaks, if very softly.
+    areas = pose.mesh.face_areas / pose.mesh.area + np.finfo(float).eps
+    sums = around @ (of_polygon @ (areas[:, None] * values[pose.mesh.faces].mean(axis=1)))
+    totals = around @ (of_polygon @ areas)
+    by_polygons = ~seen & (totals > 0)
+    own[by_polygons] = sums[by_polygons] / totals[by_polygons, None]
+    return own, seen | by_polygons
+
+
+def _around(character: Character) -> csr_matrix:
+    """(n, p) 1 where a polygon of a character has a corner at a vertex."""
+    rows, columns = [], []
+    ranges = list(zip(vertex_ranges(character), polygon_ranges(character), strict=True))
+    for (obj, its_vertices), (_, its_polygons) in ranges:
+        vertices, polygons = _corners(obj.data)
+        rows.append(vertices + its_vertices.start)
+        columns.append(polygons + its_polygons.start)
+    row, column = np.concatenate(rows), np.concatenate(columns)
+    shape = (ranges[-1][0][1].stop, ranges[-1][1][1].stop)
+    return csr_matrix((np.ones(len(row)), (row, column)), shape=shape)
+
+
+def _corners(mesh: bpy.types.Mesh) -> tuple[IntArray, IntArray]:
+    """Vertex and polygon of each corner of a mesh."""
+    vertices = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", vertices)
+    size = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.polygons.foreach_get("loop_total", size)
+    return vertices.astype(np.int64), np.repeat(np.arange(len(size)), size)
+
+
+def _places(character: Character) -> FloatArray:
+    """(n, 3) own vertices of a character as they were modelled, in world space."""
+    places = []
+    for obj in character.objects:
+        points = np.empty(3 * len(obj.data.vertices), dtype=np.float32)
+        obj.data.vertices.foreach_get("co", points)
+        world = np.array(obj.matrix_world)
+        places.append(points.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3])
+    return np.concatenate(places)
