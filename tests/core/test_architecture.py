@@ -27,6 +27,7 @@ CHAIN = [
     "mixture",
     "regions",
     "shape",
+    "cut",
     "parts",
     "model_file",
     "segmentation",
