@@ -27,6 +27,7 @@ CHAIN = [
     "mixture",
     "regions",
     "shape",
+    "cut",
     "parts",
     "grouping",
     "model_file",
