@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from .coarse import Level
 from .factor import NestedDissectionFactor, SingularError
 from .laplacian import stiffness_matrix, unit_area_masses
-from .mesh import FloatArray, IntArray, TriangleMesh, edges_of
+from .mesh import BoolArray, FloatArray, IntArray, TriangleMesh, edges_of
 
 LARGE = 200_000
 """Vertices from which posteriors are smoothed on cells."""
@@ -47,11 +47,21 @@ class FaceAdjacency:
         lengths = np.linalg.norm(vertices[edges[same, 0]] - vertices[edges[same, 1]], axis=1)
         return cls(np.stack([owner[same], owner[same + 1]], axis=1), lengths)
 
+    def across(self, polygon_of: IntArray) -> BoolArray:
+        """(p,) whether the two sides are of different polygons, given the polygon of each face (-1: none)."""
+        pairs = polygon_of[self.pairs]
+        return np.asarray((pairs[:, 0] != pairs[:, 1]) & (pairs >= 0).all(axis=1))
+
     def between_polygons(self, polygon_of: IntArray) -> FaceAdjacency:
         """The same borders between polygons, given the polygon of each face (-1: none); those inside one drop out."""
-        pairs = polygon_of[self.pairs]
-        across = (pairs[:, 0] != pairs[:, 1]) & (pairs >= 0).all(axis=1)
-        return FaceAdjacency(pairs[across], self.lengths[across])
+        across = self.across(polygon_of)
+        return FaceAdjacency(polygon_of[self.pairs[across]], self.lengths[across])
+
+    def among(self, pairs: IntArray) -> BoolArray:
+        """(p,) whether the border is one of (q, 2) others, whichever face comes first."""
+        most = 1 + max(int(self.pairs.max(initial=0)), int(np.max(pairs, initial=0)))
+        here, there = (np.sort(each, axis=1) @ np.array([most, 1]) for each in (self.pairs, pairs))
+        return np.isin(here, there)
 
 
 def smooth_posteriors(mesh: TriangleMesh, posteriors: FloatArray, length: float) -> FloatArray:

@@ -15,15 +15,16 @@ from os import PathLike
 from typing import Any, Literal, get_args
 
 import numpy as np
-from scipy.sparse import diags
+from scipy.sparse import csr_matrix, diags
 from threadpoolctl import threadpool_limits
 
 from . import model_file
+from .cut import crease_weights, cut_borders
 from .grouping import Contacts, Ground, Grouping
 from .intrinsic import Laplacian, better_triangles
 from .laplacian import unit_area_masses
 from .memory import available_memory
-from .mesh import FloatArray, IntArray, TriangleMesh
+from .mesh import BoolArray, FloatArray, IntArray, TriangleMesh
 from .mixture import CovarianceType, GaussianMixture, TooFewSamplesError, drawn_evenly, fit_mixtures
 from .parts import parts
 from .regions import FaceAdjacency, connected_regions, merge_crumbs, smooth_posteriors
@@ -62,6 +63,8 @@ MAX_SAMPLES = 20_000
 """Vertices that take part in the mixture, spread evenly by area where there are more."""
 MIN_SHARE = 0.005
 """Smallest part, as a share of the area."""
+MARKED = 0.1
+"""What a border at a marked edge costs, as a share of what it would."""
 SMOOTHING_LENGTH = 0.03
 """Width of the smoothing along borders at smoothness 1, in units of the square root of the area."""
 PAPER: dict[str, Any] = {
@@ -416,6 +419,7 @@ class PoseSegmentation:
         polygons: Sequence[IntArray],
         min_share: float | None = None,
         progress: Callable[[float], None] | None = None,
+        marked: IntArray | None = None,
     ) -> IntArray:
         """Label the polygons of one mesh, seen in one or several poses, as `segment_faces` does.
 
@@ -428,10 +432,13 @@ class PoseSegmentation:
             -1 stands for a triangle of none, which shapes the surface but has no say.
         progress
             Called after each pose with the share that is done, 0 to 1. An error that it raises ends the work.
+        marked : (q, 2) int array, optional
+            Neighbouring polygons between which a border is welcome, as at hard edges, seams and borders of materials:
+            one nearby moves there.
 
         Returns
         -------
-        (p,) component of each polygon, 0 to the largest number in `polygons`; -1 for one without a triangle in any
+        (p,) segment of each polygon, 0 to the largest number in `polygons`; -1 for one without a triangle in any
         pose.
 
         Raises
@@ -448,7 +455,7 @@ class PoseSegmentation:
                 raise ValueError(
                     f"pose {i} has {pose.surface.original.n_faces} triangles, but polygons for {np.shape(polygon_of)}"
                 )
-        return self._clean(described, polygons, min_share, progress)[0]
+        return self._clean(described, polygons, min_share, progress, marked)[0]
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the fitted model to a JSON file that holds data only.
@@ -636,16 +643,17 @@ class PoseSegmentation:
         polygons: Sequence[IntArray] | None,
         min_share: float | None,
         progress: Callable[[float], None] | None = None,
+        marked: IntArray | None = None,
     ) -> tuple[IntArray, FaceAdjacency]:
         """Labels of polygons (None: each triangle is one) from the mean posterior of all poses, and neighbours."""
-        smoothness = self._setting("smoothness")
+        length = self._setting("smoothness") * SMOOTHING_LENGTH
         least = self._least_share(min_share)
         if polygons is None:
             polygons = [np.arange(pose.surface.original.n_faces) for pose in poses]
         n_polygons = 1 + max(int(polygon_of.max()) for polygon_of in polygons)
         posteriors = np.zeros((n_polygons, self.n_segments_))
-        areas, centres, poses_seen = np.zeros(n_polygons), np.zeros((n_polygons, 3)), np.zeros(n_polygons)
-        borders = []
+        areas, poses_seen = np.zeros(n_polygons), np.zeros(n_polygons)
+        layouts = []
         for pose, polygon_of in zip(poses, polygons, strict=True):
             surface, original = pose.surface, pose.surface.original
             sum_over = indicator(np.where(polygon_of < 0, n_polygons, polygon_of), n_polygons + 1)[:n_polygons]
@@ -655,18 +663,59 @@ class PoseSegmentation:
             seen = total > 0
             mean = diags(1 / np.where(seen, total, 1)) @ sum_over @ diags(weight)
             of_vertices = self._posteriors(pose)
-            if smoothness > 0:
-                of_vertices = smooth_posteriors(surface.mesh, of_vertices, smoothness * SMOOTHING_LENGTH)
+            if length > 0:
+                of_vertices = smooth_posteriors(surface.mesh, of_vertices, length)
             posteriors += mean @ surface.to_faces(of_vertices)
-            centres += mean @ original.vertices[original.faces].mean(axis=1)
             areas += total * seen
             poses_seen += seen
-            borders.append(FaceAdjacency.of(surface.welded_faces, original.vertices).between_polygons(polygon_of))
+            layouts.append(_Layout.of(surface, polygon_of, mean, length > 0))
             if progress:
-                progress(len(borders) / len(poses))
-        seen = poses_seen > 0
+                progress(len(layouts) / len(poses))
         # Of one mesh the borders are the same in every pose; modifiers may hide some of them in one.
-        adjacency = max(borders, key=lambda border: len(border.pairs))
-        centres /= np.maximum(poses_seen, 1)[:, None]
-        labels = np.where(seen, posteriors.argmax(axis=1), -1)
+        layout = max(layouts, key=lambda layout: len(layout.adjacency.pairs))
+        others = sum(other.centres for other in layouts) / np.maximum(poses_seen, 1)[:, None]
+        centres = np.where(layout.seen[:, None], layout.centres, others)
+        areas /= np.maximum(poses_seen, 1)
+        posteriors /= np.maximum(poses_seen, 1)[:, None]
+        labels = np.where(poses_seen > 0, posteriors.argmax(axis=1), -1)
+        adjacency = layout.adjacency
+        if length > 0:
+            weights = layout.weights
+            if marked is not None:
+                weights = np.where(adjacency.among(marked), MARKED * weights, weights)
+            labels = cut_borders(posteriors, areas, centres, adjacency, weights, length, labels)
         return merge_crumbs(labels, areas, centres, adjacency, least)
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """Where the p polygons of a mesh lie in one pose, of area 1.
+
+    Attributes
+    ----------
+    seen : (p,) bool array
+        Whether any triangle is of the polygon.
+    centres : (p, 3) array
+        0 where not seen.
+    adjacency : FaceAdjacency
+        Of the polygons.
+    weights : (b,) array
+        What each border costs by its length, see `crease_weights`.
+    """
+
+    seen: BoolArray
+    centres: FloatArray
+    adjacency: FaceAdjacency
+    weights: FloatArray
+
+    @classmethod
+    def of(cls, surface: Surface, polygon_of: IntArray, mean: csr_matrix, weighed: bool) -> _Layout:
+        """Given the polygon of each triangle and the (p, m) mean of triangles over each polygon."""
+        original = surface.original
+        unit = np.sqrt(original.area)
+        adjacency = FaceAdjacency.of(surface.welded_faces, original.vertices / unit)
+        across = adjacency.across(polygon_of)
+        weights = crease_weights(surface, adjacency) if weighed else np.ones(len(adjacency.lengths))
+        centres = np.asarray(mean @ (original.vertices[original.faces].mean(axis=1) / unit))
+        seen = np.asarray(mean.sum(axis=1)).ravel() > 0
+        return cls(seen, centres, adjacency.between_polygons(polygon_of), weights[across])
