@@ -585,13 +585,16 @@ class PoseSegmentation:
         if self.preset == "paper":
             return fit_mixtures(samples, shares, wanted, covariance_type, self.random_state, 1, tick)
         types = AUTO if covariance_type == "auto" else (covariance_type,)
-        n_components = min(max(COMPONENTS, PER_SEGMENT * wanted), wanted + MOST_MORE, len(samples))
         found = []
         for i, each in enumerate(types):
 
             def part(share: float, begun: int = i) -> None:
                 tick((begun + share) / len(types))
 
+            n_components = min(max(COMPONENTS, PER_SEGMENT * wanted), wanted + MOST_MORE, len(samples))
+            if each in ("tied", "full"):
+                # A finer mixture of these would take minutes, and learn every pose by heart.
+                n_components = max(wanted, COMPONENTS // PER_SEGMENT) if self.n_segments == "auto" else wanted
             try:
                 found += fit_mixtures(samples, shares, n_components, each, None, CANDIDATES, part)
             except TooFewSamplesError as error:
