@@ -49,10 +49,8 @@ MOST = 0.8
 """Share of the work that is signatures."""
 MIXED = 0.9
 """Share of the work when the mixture is fitted."""
-AUTO: tuple[CovarianceType, ...] = ("shared", "diag")
-"""Covariances among which `covariance_type="auto"` chooses."""
-CANDIDATES = 3
-"""Mixtures of each covariance whose groups are compared."""
+CANDIDATES = 4
+"""Mixtures whose groups are compared."""
 COMPONENTS, PER_SEGMENT, MOST_MORE = 24, 3, 64
 """Components of the mixture: at least so many, and so many for each segment, but at most so many more than segments."""
 SIGNATURE_OFFSET = 1.0
@@ -104,8 +102,8 @@ class PoseSegmentation:
         paper's setting each component is one. "auto": as many as are nearly as certain as any number, see
         `Grouping.best_number`; not for the paper's setting.
     covariance_type : "auto", "shared", "diag", "full", "tied" or "spherical"
-        "shared" is one diagonal covariance for all components, the paper's remark. "auto" tries "shared" and "diag"
-        and takes what is surest of its segments, which foretells how well unseen poses agree (see `Grouping`).
+        "shared" is one diagonal covariance for all components, the paper's remark and the most robust on poses and
+        people that were not learned from; "auto" takes it. "tied" and "full" have one component a segment.
     n_eigenpairs : int
         Eigenpairs of each pose, without the zero modes of further components.
     n_energies : int
@@ -584,24 +582,18 @@ class PoseSegmentation:
         wanted, covariance_type = self._least_components(), self._setting("covariance_type")
         if self.preset == "paper":
             return fit_mixtures(samples, shares, wanted, covariance_type, self.random_state, 1, tick)
-        types = AUTO if covariance_type == "auto" else (covariance_type,)
-        found = []
-        for i, each in enumerate(types):
-
-            def part(share: float, begun: int = i) -> None:
-                tick((begun + share) / len(types))
-
-            n_components = min(max(COMPONENTS, PER_SEGMENT * wanted), wanted + MOST_MORE, len(samples))
-            if each in ("tied", "full"):
-                # A finer mixture of these would take minutes, and learn every pose by heart.
-                n_components = max(wanted, COMPONENTS // PER_SEGMENT) if self.n_segments == "auto" else wanted
-            try:
-                found += fit_mixtures(samples, shares, n_components, each, None, CANDIDATES, part)
-            except TooFewSamplesError as error:
-                # A cube has three different vertices at most: no more components than that.
-                n_components = max(wanted, error.distinct)
-                found += fit_mixtures(samples, shares, n_components, each, None, CANDIDATES, part)
-        return found
+        if covariance_type == "auto":
+            covariance_type = "shared"
+        n_components = min(max(COMPONENTS, PER_SEGMENT * wanted), wanted + MOST_MORE, len(samples))
+        if covariance_type in ("tied", "full"):
+            # A finer mixture of these would take minutes, and learn every pose by heart.
+            n_components = max(wanted, COMPONENTS // PER_SEGMENT) if self.n_segments == "auto" else wanted
+        try:
+            return fit_mixtures(samples, shares, n_components, covariance_type, None, CANDIDATES, tick)
+        except TooFewSamplesError as error:
+            # A cube has three different vertices at most: no more components than that.
+            n_components = max(wanted, error.distinct)
+            return fit_mixtures(samples, shares, n_components, covariance_type, None, CANDIDATES, tick)
 
     def _group(
         self, poses: Sequence[PoseSignature], mixtures: list[GaussianMixture], tick: Callable[[float], None]
