@@ -290,6 +290,38 @@ def test_text_output_is_a_table_for_a_person(command, folder):
     assert any(line.startswith("warning: Learned from one pose only") for line in lines)
 
 
+@pytest.mark.parametrize("name", ["segment", "learn"])
+def test_number_of_segments_may_be_automatic(command, folder, tmp_path, name):
+    model = tmp_path / "model.json"
+    done = command(name, folder / "pose_0.obj", *QUICK, "--segments", "auto", "--model", model, "--json")
+    assert done.code == 0, done
+    curve = PoseSegmentation.load(model).grouping_.curve()
+    assert done.result["certainty"] == {str(i): round(curve[i - 1], 3) for i in range(2, 17)}
+    assert 2 <= done.result["segments"] <= 16
+    (note,) = done.result["notes"]
+    assert f"({PoseSegmentation.load(model).n_segments_} taken)" in note
+    assert note in command(name, folder / "pose_0.obj", *QUICK, "--segments", "auto", "--model", model).out
+
+
+def test_certainty_is_told_of_a_number_that_was_given_but_not_of_the_paper(command, folder):
+    given = command("segment", folder / "pose_0.obj", *QUICK, "--json").result
+    assert len(given["certainty"]) == 15
+    assert given["notes"] == []
+    assert "certainty" not in command("segment", folder / "pose_0.obj", *QUICK, "--preset", "paper", "--json").result
+
+
+def test_automatic_number_with_the_papers_setting(command, folder):
+    done = command("segment", folder / "pose_0.obj", *QUICK, "--segments", "auto", "--preset", "paper")
+    fails(done, "cannot be automatic with the method of the paper")
+
+
+def test_marks_to_snap_to_reach_the_settings(command, folder, tmp_path):
+    output = tmp_path / "out.blend"
+    done = command("segment", folder / "pose_0.obj", *QUICK, "--snap-to", "seams,sharp", "--output", output)
+    assert done.code == 0, done
+    assert bpy.context.scene.wks_segment.snap_to == {"seams", "sharp"}
+
+
 def test_progress_goes_to_standard_error(command, folder):
     done = command("segment", folder / "pose_0.obj", *QUICK, "--json")
     assert "Signature of" in done.err
@@ -358,6 +390,10 @@ def test_apply_takes_frames(command, folder, model, tmp_path):
         ("segment", "{pose}", "--segments", "1"),
         ("segment", "{pose}", "--segments", "65"),
         ("segment", "{pose}", "--segments", "many"),
+        ("learn", "{pose}", "--model", "model.json", "--segments", "Auto"),
+        ("segment", "{pose}", "--snap-to", "creases"),
+        ("segment", "{pose}", "--snap-to", ""),
+        ("learn", "{pose}", "--model", "model.json", "--snap-to", "sharp"),
         ("segment", "{pose}", "--eigenpairs", "19"),
         ("segment", "{pose}", "--smallest-part", "nan"),
         ("segment", "{pose}", "--covariance", "round"),

@@ -1,5 +1,7 @@
 """The buttons: what they do, what they say, and that an error leaves everything as it was."""
 
+from unittest.mock import MagicMock
+
 import bpy
 import numpy as np
 import pytest
@@ -18,7 +20,7 @@ from builders import (
     snapshot,
 )
 
-from wks_segment.blender import operators
+from wks_segment.blender import operators, panel
 from wks_segment.blender import poses as reader
 from wks_segment.blender.poses import Character
 from wks_segment.core import PoseSegmentation, hierarchy, spectrum
@@ -452,7 +454,7 @@ def test_model_path_may_be_relative_to_the_blend_file(learned, tmp_path):
         (b"[1, 2", "no JSON"),
         (b"\x80\x04\x95\xff", "binary file"),
         (b'{"format": "wks_segment model", "version": 99}', "version 99"),
-        (b'{"format": "wks_segment model", "version": 1, "parameters": {}}', "damaged"),
+        (b'{"format": "wks_segment model", "version": 2, "parameters": {}}', "damaged"),
         (b"", "no JSON"),
     ],
 )
@@ -542,9 +544,84 @@ def test_defaults_are_those_of_the_paper_and_of_the_core(scene):
     assert (model.n_eigenpairs, model.n_energies) == (300, 100)
 
 
-def test_panel_sits_in_the_sidebar_under_its_own_tab():
-    from wks_segment.blender import panel
+def test_automatic_number_shows_its_curve(settings, printed):
+    settings.auto_segments = True
+    select(*limbed_poses(*BENDS))
+    printed()
+    assert OPS.learn() == {"FINISHED"}
+    model = PoseSegmentation.from_json(settings.model)
+    assert (model.n_segments, 2 <= model.n_segments_ <= 16) == ("auto", True)
+    (line,) = [line for line in settings.model_summary.splitlines() if line.startswith("Certainty")]
+    assert line.startswith("Certainty by segments: 2 0.")
+    assert line.endswith(f" ({model.n_segments_} taken)")
+    assert f"{model.n_segments_} {model.grouping_.curve()[model.n_segments_ - 1]:.2f} " in line
+    assert line.count("·") == 14
+    said = printed().out
+    assert said.index(line) < said.index("Learned: 3 poses")
 
+
+def test_automatic_number_survives_a_file_and_apply(settings, tmp_path):
+    settings.auto_segments = True
+    first, other = limbed_poses(*BENDS[:2])
+    select(first)
+    OPS.learn()
+    line = settings.model_summary.splitlines()[-1]
+    OPS.save_model(filepath=str(tmp_path / "model.json"))
+    settings.auto_segments = False
+    OPS.load_model(filepath=str(tmp_path / "model.json"))
+    assert settings.model_summary.splitlines()[-1] == line
+    select(other)
+    assert OPS.apply() == {"FINISHED"}
+    assert labels_of(other).max() < 16
+
+
+def test_a_number_that_was_given_shows_no_curve(learned, settings):
+    assert "Certainty" not in settings.model_summary
+
+
+def test_automatic_number_needs_the_robust_method(settings):
+    settings.auto_segments, settings.preset = True, "paper"
+    select(limbed())
+    fails(OPS.learn, "cannot be automatic with the method of the paper")
+
+
+def test_automatic_number_fits_a_mesh_of_few_faces(settings):
+    """Eight segments would be too many for a cube; two are not."""
+    settings.auto_segments, settings.n_segments = True, 8
+    corners = [(x, y, z) for x in (0, 1) for y in (0, 1.5) for z in (0, 4)]
+    cube = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    select(mesh_object(corners, cube))
+    assert OPS.learn() == {"FINISHED"}
+
+
+def drawn(panel):
+    """The layout that a panel was drawn on."""
+    layout = MagicMock()
+    shown = type("Shown", (panel.__bases__[0],), {"layout": layout})()
+    panel.draw(shown, bpy.context)
+    return layout
+
+
+@pytest.mark.parametrize("automatic", [False, True])
+def test_number_is_grey_where_it_is_automatic(settings, automatic):
+    settings.auto_segments = automatic
+    row = drawn(panel.WKS_SEGMENT_PT_main).row.return_value
+    row.prop.assert_called_once_with(settings, "auto_segments", toggle=True)
+    number = row.row.return_value
+    number.prop.assert_called_once_with(settings, "n_segments")
+    assert number.enabled is not automatic
+
+
+def test_panel_breaks_long_lines_and_keeps_pairs_together(settings):
+    settings.model_summary = "From Fox\nCertainty by segments: " + " · ".join(f"{i} 0.91" for i in range(2, 17))
+    labels = drawn(panel.WKS_SEGMENT_PT_model).column.return_value.label.call_args_list
+    lines = [call.kwargs["text"] for call in labels]
+    assert lines[0] == "From Fox"
+    assert max(map(len, lines)) <= panel.WIDTH
+    assert all(line.count("\N{NO-BREAK SPACE}") == line.count("0.91") for line in lines)
+
+
+def test_panel_sits_in_the_sidebar_under_its_own_tab():
     main = panel.CLASSES[0]
     assert (main.bl_space_type, main.bl_region_type, main.bl_category) == ("VIEW_3D", "UI", "WKS")
     for child in panel.CLASSES[1:]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -39,8 +39,10 @@ OPTIONS = {
     "--preset": "preset",
 }
 """Options that are settings: their text, limits and defaults come from the property group."""
-OUTPUT_OPTIONS = {"--vertex-groups": "vertex_groups"}
+OUTPUT_OPTIONS = {"--vertex-groups": "vertex_groups", "--snap-to": "snap_to"}
 """The same for commands that write labels."""
+AUTOMATIC = {"n_segments": "auto_segments"}
+"""Numbers that can be left open by the word "auto", and the settings that do it."""
 
 
 def run(arguments: list[str]) -> int:
@@ -128,13 +130,22 @@ def _add_settings(parser: argparse.ArgumentParser, options: dict[str, str] = OPT
 
 def _add_setting(parser: argparse.ArgumentParser, option: str, name: str) -> None:
     setting = WKSSegmentSettings.bl_rna.properties[name]
-    described: dict[str, Any] = {"dest": name, "help": f"{setting.description} (default: {setting.default})"}
-    if setting.type == "ENUM":
+    several = setting.type == "ENUM" and setting.is_enum_flag
+    default = "none" if several else setting.default  # of several choices, Blender warns
+    described: dict[str, Any] = {"dest": name, "help": f"{setting.description} (default: {default})"}
+    if several:
+        described["type"] = _some_of([item.identifier for item in setting.enum_items])
+        described["metavar"] = ",".join(item.identifier for item in setting.enum_items)
+    elif setting.type == "ENUM":
         described["choices"] = [item.identifier for item in setting.enum_items]
     else:
         number = int if setting.type == "INT" else float
         described["type"] = _within(number, setting.hard_min, setting.hard_max)
         described["metavar"] = "N"
+    if name in AUTOMATIC:
+        described["type"] = _or_auto(described["type"])
+        described["metavar"] = "N|auto"
+        described["help"] += f"; auto: {WKSSegmentSettings.bl_rna.properties[AUTOMATIC[name]].description}"
     described["help"] = described["help"].replace("%", "%%")
     parser.add_argument(option, **described)
 
@@ -147,6 +158,26 @@ def _within(number: type[int] | type[float], least: float, most: float) -> Any:
         return value
 
     parse.__name__ = "whole number" if number is int else "number"
+    return parse
+
+
+def _or_auto(number: Callable[[str], float]) -> Callable[[str], float | str]:
+    def parse(text: str) -> float | str:
+        try:
+            return text if text == "auto" else number(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f'must be a whole number or "auto", not {text!r}') from None
+
+    return parse
+
+
+def _some_of(known: list[str]) -> Callable[[str], set[str]]:
+    def parse(text: str) -> set[str]:
+        chosen = text.split(",")
+        if not set(chosen) <= set(known):
+            raise argparse.ArgumentTypeError(f"must be one or several of {','.join(known)}, not {text!r}")
+        return set(chosen)
+
     return parse
 
 
@@ -188,7 +219,8 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
         raise UserError("apply has nothing to write: give --output, --render or both")
     _check_outputs(options)
     model = _load(options.model)
-    report = Report([], n_segments=model.n_segments_)
+    report = Report([])
+    report.tell_of(model)
     poses = _read(options, report)
     settings = _settings(options)
     if options.smoothness is not None:
@@ -292,7 +324,10 @@ def _settings(options: argparse.Namespace) -> WKSSegmentSettings:
     for name in (OPTIONS | OUTPUT_OPTIONS).values():
         settings.property_unset(name)
         value = getattr(options, name, None)
-        if value is not None:
+        automatic = name in AUTOMATIC and value == "auto"
+        if name in AUTOMATIC:
+            setattr(settings, AUTOMATIC[name], automatic)
+        if value is not None and not automatic:
             setattr(settings, name, value)
     settings.write_materials = getattr(options, "materials", False)
     return settings
@@ -342,6 +377,8 @@ def _result(options: argparse.Namespace, report: Report) -> dict[str, Any]:
             for pose, laplacian in zip(report.poses, report.laplacians, strict=True)
         ],
         "segments": report.n_segments,
+        **({} if report.certainty is None else {"certainty": report.certainty}),
+        "notes": report.notes,
         "seconds": {name: round(seconds, 3) for name, seconds in report.seconds.items()},
         "warnings": report.warnings,
         "files": {name: str(path) for name, path in outputs.items() if path is not None},
@@ -361,6 +398,7 @@ def _text(result: dict[str, Any]) -> str:
     lines = [table(header, rows), "", table(["stage", "seconds"], stages), "", f"{result['segments']} segments"]
     if with_agreement:
         lines.append(f"agreement of unseen poses: {result['agreement']:.3f} of the area has the learned label")
+    lines += result["notes"]
     lines += [f"warning: {warning}" for warning in result["warnings"]]
     lines += [f"{name}: {path}" for name, path in result["files"].items()]
     return "\n".join(lines)

@@ -102,6 +102,8 @@ def run(
             for pose, known, share in zip(poses, learned, agreement, strict=True)
         ],
         "segments": report.n_segments,
+        **({} if report.certainty is None else {"certainty": report.certainty}),
+        "notes": report.notes,
         "seconds": {name: round(seconds, 3) for name, seconds in report.seconds.items()},
         "agreement": round(float(np.mean([a for a, known in zip(agreement, learned, strict=True) if not known])), 4),
         "warnings": tasks.pose_warnings(poses, from_frames=True),

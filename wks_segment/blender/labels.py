@@ -82,6 +82,21 @@ def has_labels(mesh: bpy.types.Mesh) -> bool:
     return NOTE in mesh and hasattr(mesh[NOTE], "to_dict")
 
 
+def own_material_index(mesh: bpy.types.Mesh) -> IntArray:
+    """(p,) material slot of each polygon, without what `write_labels` wrote: the slots that Clear leaves."""
+    note = mesh[NOTE].to_dict() if has_labels(mesh) else {}
+    now = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.polygons.foreach_get("material_index", now)
+    ours = _our_slots(mesh, note)
+    before = mesh.attributes.get(note.get("own_materials", ""))
+    own = np.zeros_like(now)
+    if before is not None:
+        before.data.foreach_get("value", own)
+    # Slots that the user added behind ours move up.
+    moved = now - np.searchsorted(ours, now).astype(np.int32)
+    return np.where(np.isin(now, ours), own, moved)
+
+
 def _write_ints(mesh: bpy.types.Mesh, key: str, name: str, domain: str, values: NDArray[np.integer[Any]]) -> None:
     """Add an int attribute and note the name that it got: a name that is taken gets a number."""
     attribute = mesh.attributes.new(free_name(mesh, name), "INT", domain)
@@ -141,21 +156,16 @@ def _material(component: int) -> bpy.types.Material:
 
 def _restore_materials(mesh: bpy.types.Mesh, note: dict[str, Any]) -> None:
     """Take our slots out, and give faces that still use them their own material back."""
-    first, last = note["first_slot"], note.get("last_slot", note["first_slot"])
-    ours = [
-        i for i, m in enumerate(mesh.materials) if first <= i < last and m is not None and COMPONENT in m
-    ]  # fmt: skip
-    now = np.empty(len(mesh.polygons), dtype=np.int32)
-    mesh.polygons.foreach_get("material_index", now)
-    before = mesh.attributes.get(note.get("own_materials", ""))
-    own = np.zeros_like(now)
-    if before is not None:
-        before.data.foreach_get("value", own)
-    # Slots that the user added behind ours move up.
-    moved = now - np.searchsorted(ours, now).astype(np.int32)
-    restored = np.where(np.isin(now, ours), own, moved)
-    for index in reversed(ours):
+    restored = own_material_index(mesh)
+    for index in reversed(_our_slots(mesh, note)):
         material = mesh.materials.pop(index=index)
         if material.users == 0:
             bpy.data.materials.remove(material)
     mesh.polygons.foreach_set("material_index", restored.astype(np.int32))
+
+
+def _our_slots(mesh: bpy.types.Mesh, note: dict[str, Any]) -> list[int]:
+    """Material slots that are ours, in order."""
+    first = note.get("first_slot", 0)
+    last = note.get("last_slot", first)
+    return [i for i, m in enumerate(mesh.materials) if first <= i < last and m is not None and COMPONENT in m]

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from textwrap import wrap
 from typing import Any
 
 import bpy
 
 NO_MODEL = "No model yet:\nselect a character,\nthen Learn and Segment"
+WIDTH = 36
+"""Letters in a line of the sidebar, about: Blender cuts off what is longer."""
 
 
 class _Sidebar:
@@ -28,6 +32,16 @@ class _Sidebar:
             column.prop(settings, name)
         return settings
 
+    def segments(self, context: bpy.types.Context) -> None:
+        """Show the number of segments, grey where it is found."""
+        settings = context.scene.wks_segment
+        row = self.layout.row(align=True)
+        number = row.row(align=True)
+        number.use_property_split, number.use_property_decorate = True, False
+        number.enabled = not settings.auto_segments
+        number.prop(settings, "n_segments")
+        row.prop(settings, "auto_segments", toggle=True)
+
 
 class WKS_SEGMENT_PT_main(_Sidebar, bpy.types.Panel):
     """Poses, the settings of the paper and the three buttons."""
@@ -43,7 +57,8 @@ class WKS_SEGMENT_PT_main(_Sidebar, bpy.types.Panel):
             self.settings(context, "use_frame_range")
             if settings.use_frame_range:
                 self.settings(context, "frame_first", "frame_last")
-        self.settings(context, "n_segments", "n_eigenpairs", "n_energies", "covariance_type", "random_state")
+        self.segments(context)
+        self.settings(context, "n_eigenpairs", "n_energies", "covariance_type", "random_state")
 
         column = self.layout.column(align=True)
         column.scale_y = 1.4
@@ -75,7 +90,7 @@ class WKS_SEGMENT_PT_model(_SubPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         column = self.layout.column()
-        for line in (context.scene.wks_segment.model_summary or NO_MODEL).splitlines():
+        for line in wrapped(context.scene.wks_segment.model_summary or NO_MODEL):
             column.label(text=line)
         row = self.layout.row(align=True)
         row.operator("wks_segment.load_model", text="Load", icon="IMPORT")
@@ -92,6 +107,7 @@ class WKS_SEGMENT_PT_advanced(_SubPanel, bpy.types.Panel):
             context,
             "smoothness",
             "min_share",
+            "snap_to",
             "preset",
             "pieces",
             "scaling",
@@ -99,6 +115,12 @@ class WKS_SEGMENT_PT_advanced(_SubPanel, bpy.types.Panel):
             "limit_minutes",
             "limit_memory",
         )
+
+
+def wrapped(text: str) -> list[str]:
+    """Lines that the sidebar has room for; what is a pair of numbers stays together."""
+    joined = re.sub(r"(?<=\d) (?=\d)", "\N{NO-BREAK SPACE}", text)
+    return [short for line in joined.splitlines() for short in wrap(line, WIDTH)]
 
 
 CLASSES = (WKS_SEGMENT_PT_main, WKS_SEGMENT_PT_outputs, WKS_SEGMENT_PT_model, WKS_SEGMENT_PT_advanced)

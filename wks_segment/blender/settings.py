@@ -8,6 +8,8 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..core import PoseSegmentation
+from .certainty import certainty_lines
+from .errors import UserError
 from .palette import MAX_COLOURS
 
 MODEL_PARAMETERS = (
@@ -54,6 +56,11 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         description="Number of kinds of parts. Parts that look alike, as both hands, are one kind",
         default=8, min=2, max=MAX_COLOURS, soft_max=20,
     )  # fmt: skip
+    auto_segments: BoolProperty(
+        name="Automatic",
+        description="As many segments as the poses show surely, up to 16",
+        default=False,
+    )
     random_state: IntProperty(
         name="Seed",
         description="Where the paper's setting begins its search. Otherwise nothing depends on luck, nor on this",
@@ -127,6 +134,17 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         description="A connected part below this share of the surface joins its neighbour",
         default=0.5, min=0.0, max=20.0, precision=1, subtype="PERCENTAGE",
     )  # fmt: skip
+    snap_to: EnumProperty(
+        name="Snap Borders To",
+        description="Edges that draw a border nearby to them. Needs some smoothness",
+        items=[
+            ("sharp", "Sharp Edges", "Edges that are marked sharp"),
+            ("seams", "Seams", "Edges that are marked as a seam"),
+            ("materials", "Material Borders", "Edges where the material changes, not counting materials of segments"),
+        ],
+        options={"ANIMATABLE", "ENUM_FLAG"},
+        default=set(),
+    )
 
     limit_minutes: FloatProperty(
         name="Ask Above",
@@ -168,10 +186,17 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
     model_summary: StringProperty(options={"HIDDEN"}, description="Lines on what the model was learned from")
 
     def new_model(self) -> PoseSegmentation:
-        """An unfitted model with these settings."""
+        """An unfitted model with these settings; UserError if they exclude each other."""
         parameters: dict[str, Any] = {name: getattr(self, name) for name in MODEL_PARAMETERS}
+        if self.auto_segments:
+            if self.preset == "paper":
+                raise UserError(
+                    "The number of segments cannot be automatic with the method of the paper: give a number, or take "
+                    "the robust method"
+                )
+            parameters["n_segments"] = "auto"
         return PoseSegmentation(**parameters)
 
     def keep_model(self, model: PoseSegmentation, summary: list[str]) -> None:
-        """Store a fitted model in the scene, with a few lines on where it is from."""
-        self.model, self.model_summary = model.to_json(), "\n".join(summary)
+        """Store a fitted model in the scene, with a few lines on where it is from and its number of segments."""
+        self.model, self.model_summary = model.to_json(), "\n".join([*summary, *certainty_lines(model)])

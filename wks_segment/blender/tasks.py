@@ -17,9 +17,11 @@ from ..core.memory import available_memory
 from ..core.mesh import FloatArray, IntArray
 from ..core.segmentation import Progress
 from . import poses as reader
+from .certainty import certainties, certainty_lines
 from .characters import Character, armature_of, group, mesh_objects
 from .errors import TooLargeError, UserError
 from .labels import write_labels
+from .marks import marked_pairs
 from .poses import Pose
 from .settings import WKSSegmentSettings
 from .weights import hard_weights, soft_weights
@@ -32,8 +34,15 @@ class Report:
     poses: list[Pose]
     laplacians: list[str] = field(default_factory=list)
     n_segments: int = 0
+    certainty: dict[int, float] | None = None
     seconds: dict[str, float] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+
+    def tell_of(self, model: PoseSegmentation) -> None:
+        """Say how many segments a fitted model has, and how certain it is of each number."""
+        self.n_segments, self.certainty = model.n_segments_, certainties(model)
+        self.notes = certainty_lines(model)
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -136,20 +145,20 @@ def learn(
     UserError
         If the core refuses a pose or the settings; the message names it.
     """
+    model = settings.new_model()
     most = max(int(pose.polygon_of.max()) + 1 for pose in poses)
-    if settings.n_segments > most:
+    if model.n_segments != "auto" and model.n_segments > most:
         raise UserError(
-            f'"{poses[0].character.name}" has {most} faces, too few for {settings.n_segments} segments: '
+            f'"{poses[0].character.name}" has {most} faces, too few for {model.n_segments} segments: '
             "take fewer segments, or subdivide it"
         )
-    model = settings.new_model()
     described = describe(model, poses, report, progress, share=0.9)
     with report.stage("mixture"):
         try:
             model.fit(described, lambda stage, share: progress("Learning the segments", share))
         except ValueError as error:
             raise UserError(f"The segments could not be learned: {error}") from error
-    report.n_segments = model.n_segments_
+    report.tell_of(model)
     return model, described
 
 
@@ -205,6 +214,7 @@ def label(
                 [poses[i].polygon_of for i in mine],
                 min_share,
                 lambda share, name=name: progress(f'Labels of "{name}"', 1.0),
+                marked=marked_pairs(poses[mine[0]].character, settings.snap_to),
             )
             found = filled(found, poses[mine[0]].character)
             labels |= {poses[i].character: found for i in mine}

@@ -40,6 +40,8 @@ def cursor_progress(context: bpy.types.Context) -> Iterator[Progress]:
 
 def finish(operator: bpy.types.Operator, verb: str, report: Report) -> set[str]:
     """Report what was done, warnings last so that they stay in the status bar."""
+    for note in report.notes:
+        operator.report({"INFO"}, note)
     operator.report({"INFO"}, f"{verb}: {', '.join(report.facts)}")
     for warning in report.warnings:
         operator.report({"WARNING"}, warning)
