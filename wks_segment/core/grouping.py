@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .mesh import FloatArray, IntArray
+from .mesh import BoolArray, FloatArray, IntArray
 from .parts import border_weights, gains_of_joining
 from .regions import FaceAdjacency, merge_crumbs
 from .surface import Surface
@@ -114,12 +114,16 @@ class Grouping:
     by_chance: FloatArray
 
     @classmethod
-    def of(cls, contacts: Contacts) -> Grouping:
-        """Join the components of a mixture, best pair first, until one group is left."""
+    def of(cls, contacts: Contacts, scattered: BoolArray | None = None) -> Grouping:
+        """Join the components of a mixture, best pair first, until one group is left.
+
+        Those that (K,) `scattered` marks are joined before all others, as the small ones are.
+        """
         borders, overlaps = contacts.borders.copy(), contacts.overlaps.copy()
         areas = np.maximum(contacts.areas, EMPTY)
         count = len(areas)
         alive = np.ones(count, dtype=bool)
+        scattered = np.zeros(count, dtype=bool) if scattered is None else scattered.copy()
         pairs, certainties, by_chance = np.zeros((count - 1, 2), dtype=np.int64), np.ones(count), np.ones(count)
         for step in range(count - 1):
             certainties[count - 1 - step] = np.trace(overlaps)
@@ -127,7 +131,7 @@ class Grouping:
             np.fill_diagonal(borders, 0)
             gain = gains_of_joining(borders, borders.sum(axis=1), areas)
             touch = borders > 0
-            small = np.minimum(areas[:, None], areas) < LEAST_SHARE
+            small = (np.minimum(areas[:, None], areas) < LEAST_SHARE) | scattered[:, None] | scattered
             # The small before the large, then what touches before what does not; each of these outweighs the rest.
             rank = 4.0 * small + 2.0 * touch + np.where(touch, gain / (1 + np.abs(gain)), overlaps)
             rank[~np.triu(alive[:, None] & alive, 1)] = -np.inf
@@ -138,7 +142,8 @@ class Grouping:
                 table[:, i] += table[:, j]
                 table[j] = table[:, j] = 0
             areas[i] += areas[j]
-            alive[j] = False
+            scattered[i] &= scattered[j]
+            scattered[j] = alive[j] = False
         return cls(pairs, certainties, by_chance)
 
     def groups(self, n_groups: int) -> IntArray:

@@ -51,6 +51,8 @@ MIXED = 0.9
 """Share of the work when the mixture is fitted."""
 CANDIDATES = 4
 """Mixtures whose groups are compared."""
+REGROUPED = 5
+"""Rounds of joining at most, until no segment is lost as crumbs."""
 COMPONENTS, PER_SEGMENT, MOST_MORE = 24, 3, 64
 """Components of the mixture: at least so many, and so many for each segment, but at most so many more than segments."""
 SIGNATURE_OFFSET = 1.0
@@ -595,6 +597,7 @@ class PoseSegmentation:
             n_components = max(wanted, error.distinct)
             return fit_mixtures(samples, shares, n_components, covariance_type, None, CANDIDATES, tick)
 
+    @threadpool_limits.wrap(limits=1, user_api="blas")  # as in `_clean`
     def _group(
         self, poses: Sequence[PoseSignature], mixtures: list[GaussianMixture], tick: Callable[[float], None]
     ) -> None:
@@ -610,6 +613,25 @@ class PoseSegmentation:
         certainties = [grouping.certainties[self._number(grouping) - 1] for grouping in groupings]
         best = int(np.argmax(certainties))
         self.mixture_, self.grouping_ = mixtures[best], groupings[best]
+        scattered = np.zeros(len(self.mixture_.weights), dtype=bool)
+        for _ in range(REGROUPED):
+            lasting = self._lasting(poses)
+            if lasting.all():
+                break
+            scattered |= ~lasting[self.grouping_.groups(len(lasting))]
+            self.grouping_ = Grouping.of(Contacts.mean(contacts[best]), scattered)
+
+    def _lasting(self, poses: Sequence[PoseSignature]) -> BoolArray:
+        """(n_segments_,) whether a segment has a part in most poses that is no crumb."""
+        seen = np.zeros(self.n_segments_)
+        for pose in poses:
+            original = pose.surface.original
+            smooth = smooth_posteriors(pose.surface.mesh, self._posteriors(pose), SMOOTHING_LENGTH)
+            labels = pose.surface.to_faces(smooth).argmax(axis=1)
+            region = connected_regions(labels, FaceAdjacency.of(pose.surface.welded_faces, original.vertices))
+            large = np.bincount(region, original.face_areas) >= MIN_SHARE * original.area
+            seen[np.unique(labels[large[region]])] += 1
+        return np.asarray(seen >= len(poses) / 2)
 
     def _least_components(self) -> int:
         return 2 if isinstance(self.n_segments, str) else self.n_segments
