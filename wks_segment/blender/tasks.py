@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from ..core import Connection, PoseSegmentation, PoseSignature, SpectrumError, connect
 from ..core.memory import available_memory
 from ..core.mesh import FloatArray, IntArray
-from ..core.segmentation import Progress
+from ..core.segmentation import DESCRIBED, Progress
 from . import poses as reader
 from .certainty import certainties, certainty_lines
 from .characters import Character, armature_of, group, mesh_objects
@@ -152,7 +152,7 @@ def learn(
             f'"{poses[0].character.name}" has {most} faces, too few for {model.n_segments} segments: '
             "take fewer segments, or subdivide it"
         )
-    described = describe(model, poses, report, progress, share=0.9)
+    described = describe(model, poses, report, progress, share=DESCRIBED)
     with report.stage("mixture"):
         try:
             model.fit(described, lambda stage, share: progress("Learning the segments", share))

@@ -45,7 +45,7 @@ PROGRESS_SECONDS = 0.1
 """Time between two reports of progress."""
 BESIDE_EIGENPAIRS = 1.5
 """Time of the whole job in that of its eigenpairs, about."""
-MOST = 0.8
+DESCRIBED = 0.8
 """Share of the work that is signatures."""
 MIXED = 0.9
 """Share of the work when the mixture is fitted."""
@@ -315,10 +315,10 @@ class PoseSegmentation:
             raise ValueError("there is no pose to learn from: pass one mesh at least, better three to five")
         tick = progress or (lambda stage, share: None)
         new = {i: mesh for i, mesh in enumerate(meshes) if isinstance(mesh, TriangleMesh)}
-        found = self.describe_all(list(new.values()), None, lambda stage, share: tick(stage, MOST * share))
+        found = self.describe_all(list(new.values()), None, lambda stage, share: tick(stage, DESCRIBED * share))
         described = dict(zip(new, found, strict=True))
         poses = [described.get(i) or self._described(mesh) for i, mesh in enumerate(meshes)]
-        tick("mixture", MOST)
+        tick("mixture", DESCRIBED)
         weights = np.concatenate([unit_area_masses(pose.surface.mesh) for pose in poses])
         if self._least_components() > len(weights):
             raise ValueError(f"n_segments is {self.n_segments}, but the poses have only {len(weights)} vertices")
@@ -338,7 +338,9 @@ class PoseSegmentation:
         if self.preset == "paper":
             self.spread_ = np.ones_like(self.spread_)
         samples = (samples - self.centre_) / self.spread_
-        mixtures = self._mixtures(samples, shares, lambda share: tick("mixture", MOST + (MIXED - MOST) * share))
+        mixtures = self._mixtures(
+            samples, shares, lambda share: tick("mixture", DESCRIBED + (MIXED - DESCRIBED) * share)
+        )
         self.mixture_ = mixtures[0]
         self.grouping_: Grouping | None = None
         if self.preset != "paper":
