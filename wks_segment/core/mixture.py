@@ -25,7 +25,7 @@ CovarianceType = Literal["shared", "diag", "full", "tied", "spherical"]
 VARIANCE_FLOOR = 1e-3
 """Added to every variance, as a fraction of the samples' own mean variance."""
 MAX_ITERATIONS = 200
-TOLERANCE = 1e-4
+TOLERANCE = 1e-3
 """EM ends when the mean log-likelihood rises by less than this in one round."""
 SEEDS = range(6)
 """EM is started by k-means from each of these, on a sketch of the samples; the likeliest mixture is refined on all of

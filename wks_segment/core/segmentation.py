@@ -49,8 +49,14 @@ DESCRIBED = 0.8
 """Share of the work that is signatures."""
 MIXED = 0.9
 """Share of the work when the mixture is fitted."""
-CANDIDATES = 4
-"""Mixtures whose groups are compared."""
+AUTO: tuple[CovarianceType, ...] = ("shared", "diag")
+"""Covariances that `covariance_type="auto"` tries on several poses of one mesh; else it takes the first."""
+CANDIDATES = 3
+"""Mixtures of each covariance whose groups are compared."""
+EARNED = 0.8
+"""Another covariance than the first is taken if its labels disagree less than this share as much between the poses."""
+COMPARED = 4_000
+"""Faces on which the labels of the learned poses are compared."""
 REGROUPED = 5
 """Rounds of joining at most, until no segment is lost as crumbs."""
 COMPONENTS, PER_SEGMENT, MOST_MORE = 24, 3, 64
@@ -104,8 +110,9 @@ class PoseSegmentation:
         paper's setting each component is one. "auto": as many as are nearly as certain as any number, see
         `Grouping.best_number`; not for the paper's setting.
     covariance_type : "auto", "shared", "diag", "full", "tied" or "spherical"
-        "shared" is one diagonal covariance for all components, the paper's remark and the most robust on poses and
-        people that were not learned from; "auto" takes it. "tied" and "full" have one component a segment.
+        "shared" is one diagonal covariance for all components, the paper's remark and the most robust on bodies that
+        were not learned from. "auto" takes it, unless the poses are of one mesh and "diag" gives labels that agree far
+        better between them. "tied" and "full" have one component a segment.
     n_eigenpairs : int
         Eigenpairs of each pose, without the zero modes of further components.
     n_energies : int
@@ -339,7 +346,7 @@ class PoseSegmentation:
             self.spread_ = np.ones_like(self.spread_)
         samples = (samples - self.centre_) / self.spread_
         mixtures = self._mixtures(
-            samples, shares, lambda share: tick("mixture", DESCRIBED + (MIXED - DESCRIBED) * share)
+            samples, shares, _alike(poses), lambda share: tick("mixture", DESCRIBED + (MIXED - DESCRIBED) * share)
         )
         self.mixture_ = mixtures[0]
         self.grouping_: Grouping | None = None
@@ -580,24 +587,30 @@ class PoseSegmentation:
         return np.asarray((scaled - self.centre_.astype(scaled.dtype)) / self.spread_.astype(scaled.dtype))
 
     def _mixtures(
-        self, samples: FloatArray, shares: FloatArray, tick: Callable[[float], None]
+        self, samples: FloatArray, shares: FloatArray, alike: bool, tick: Callable[[float], None]
     ) -> list[GaussianMixture]:
         """Mixtures that may do."""
         wanted, covariance_type = self._least_components(), self._setting("covariance_type")
         if self.preset == "paper":
             return fit_mixtures(samples, shares, wanted, covariance_type, self.random_state, 1, tick)
-        if covariance_type == "auto":
-            covariance_type = "shared"
-        n_components = min(max(COMPONENTS, PER_SEGMENT * wanted), wanted + MOST_MORE, len(samples))
-        if covariance_type in ("tied", "full"):
-            # A finer mixture of these would take minutes, and learn every pose by heart.
-            n_components = max(wanted, COMPONENTS // PER_SEGMENT) if self.n_segments == "auto" else wanted
-        try:
-            return fit_mixtures(samples, shares, n_components, covariance_type, None, CANDIDATES, tick)
-        except TooFewSamplesError as error:
-            # A cube has three different vertices at most: no more components than that.
-            n_components = max(wanted, error.distinct)
-            return fit_mixtures(samples, shares, n_components, covariance_type, None, CANDIDATES, tick)
+        types = (AUTO if alike else AUTO[:1]) if covariance_type == "auto" else (covariance_type,)
+        found = []
+        for i, each in enumerate(types):
+
+            def part(share: float, begun: int = i) -> None:
+                tick((begun + share) / len(types))
+
+            n_components = min(max(COMPONENTS, PER_SEGMENT * wanted), wanted + MOST_MORE, len(samples))
+            if each in ("tied", "full"):
+                # A finer mixture of these would take minutes, and learn every pose by heart.
+                n_components = max(wanted, COMPONENTS // PER_SEGMENT) if self.n_segments == "auto" else wanted
+            try:
+                found += fit_mixtures(samples, shares, n_components, each, None, CANDIDATES, part)
+            except TooFewSamplesError as error:
+                # A cube has three different vertices at most: no more components than that.
+                n_components = max(wanted, error.distinct)
+                found += fit_mixtures(samples, shares, n_components, each, None, CANDIDATES, part)
+        return found
 
     @threadpool_limits.wrap(limits=1, user_api="blas")  # as in `_clean`
     def _group(
@@ -605,15 +618,34 @@ class PoseSegmentation:
     ) -> None:
         """Keep the mixture whose groups are the most certain, and its grouping."""
         contacts: list[list[Contacts]] = [[] for _ in mixtures]
+        samples: list[list[FloatArray]] = [[] for _ in mixtures]
+        first = poses[0].surface.original
+        drawn = drawn_evenly(first.face_areas / first.area, COMPARED) if _alike(poses) else None
         for i, pose in enumerate(poses):
             tick(i / len(poses))
             ground, standardised = Ground.of(pose.surface), self._standardised(pose.signature)
-            for mixture, found in zip(mixtures, contacts, strict=True):
+            for mixture, found, kept in zip(mixtures, contacts, samples, strict=True):
                 smooth = smooth_posteriors(pose.surface.mesh, mixture.posteriors(standardised), SMOOTHING_LENGTH)
-                found.append(Contacts.on(ground, pose.surface.to_faces(smooth)))
+                of_faces = pose.surface.to_faces(smooth)
+                found.append(Contacts.on(ground, of_faces))
+                if drawn is not None:
+                    kept.append(of_faces[drawn])
         groupings = [Grouping.of(Contacts.mean(found)) for found in contacts]
-        certainties = [grouping.certainties[self._number(grouping) - 1] for grouping in groupings]
-        best = int(np.argmax(certainties))
+        if drawn is None:
+            scores = [grouping.certainties[self._number(grouping) - 1] for grouping in groupings]
+        else:
+            scores = []
+            for grouping, kept in zip(groupings, samples, strict=True):
+                number = self._number(grouping)
+                labels = np.stack([(each @ np.eye(number)[grouping.groups(number)]).argmax(axis=1) for each in kept])
+                scores.append(float((labels[:, None] == labels).mean()))
+        # What has more to fit must earn it.
+        first_type = mixtures[0].covariance_type
+        losses = [
+            (1 - score) / (1 if mixture.covariance_type == first_type else EARNED)
+            for score, mixture in zip(scores, mixtures, strict=True)
+        ]
+        best = int(np.argmin(losses))
         self.mixture_, self.grouping_ = mixtures[best], groupings[best]
         scattered = np.zeros(len(self.mixture_.weights), dtype=bool)
         for _ in range(REGROUPED):
@@ -704,6 +736,12 @@ class PoseSegmentation:
                 weights = np.where(adjacency.among(marked), MARKED * weights, weights)
             labels = cut_borders(posteriors, areas, centres, adjacency, weights, length, labels)
         return merge_crumbs(labels, areas, centres, adjacency, least)
+
+
+def _alike(poses: Sequence[PoseSignature]) -> bool:
+    """Whether several poses are of one mesh."""
+    faces = [pose.surface.original.faces for pose in poses]
+    return len(poses) > 1 and all(np.array_equal(faces[0], other) for other in faces[1:])
 
 
 @dataclass(frozen=True)
