@@ -48,6 +48,16 @@ def test_the_small_and_the_scattered_are_joined_before_others():
     assert 2 in Grouping.of(Contacts(ROW, EVEN, overlaps(EVEN)), scattered).pairs[0]
 
 
+def test_components_that_take_each_others_place_from_pose_to_pose_are_one_segment():
+    # Half of the faces belong to component 0 in one pose, to 3 in the other; the rest to 1 and to 2.
+    labels = np.array([[0] * 4 + [1, 1, 2, 2], [3] * 4 + [1, 1, 2, 2]])
+    contacts = Contacts(ROW, EVEN, overlaps(EVEN)).with_changes(np.eye(4)[labels])
+    expected = np.zeros((4, 4))
+    expected[0, 3] = expected[3, 0] = 20 * 0.5 / 2
+    np.testing.assert_allclose(contacts.borders - ROW, expected)
+    assert Grouping.of(contacts).pairs[0].tolist() == [0, 3]
+
+
 def test_what_touches_nothing_is_joined_by_overlap():
     apart = np.zeros((3, 3))
     areas = np.full(3, 1 / 3)

@@ -22,6 +22,8 @@ LEAST_SHARE = 0.01
 """Groups under this share of the area are joined first: they would take the place of a part."""
 LEAST_REGION = 0.002
 """Connected regions under this share of the area have no say in the borders."""
+CHANGE = 20.0
+"""Border length, in units of the square root of the area, that a change of all faces from pose to pose counts as."""
 EMPTY = 1e-6
 """Area that a component without any counts as."""
 
@@ -92,6 +94,19 @@ class Contacts:
     def mean(cls, poses: list[Contacts]) -> Contacts:
         """Of several poses, each as much as the others."""
         return cls(*(np.mean([getattr(pose, name) for pose in poses], axis=0) for name in cls.__dataclass_fields__))
+
+    def with_changes(self, posteriors: FloatArray) -> Contacts:
+        """With a border, too, between components that take each other's place from pose to pose.
+
+        Given (p, f, K) posteriors of f faces, each as much of the area, in p ≥ 2 poses of one mesh. Or what a pose
+        changes would make segments of its own in that pose.
+        """
+        n_poses, n_faces, n_components = posteriors.shape
+        times = np.zeros((n_faces, n_components))
+        np.add.at(times, (np.arange(n_faces), posteriors.argmax(axis=2)), 1)
+        changes = times.T @ times / (n_faces * n_poses * (n_poses - 1))
+        np.fill_diagonal(changes, 0)
+        return Contacts(self.borders + CHANGE * changes, self.areas, self.overlaps)
 
 
 @dataclass(frozen=True)

@@ -630,7 +630,10 @@ class PoseSegmentation:
                 found.append(Contacts.on(ground, of_faces))
                 if drawn is not None:
                     kept.append(of_faces[drawn])
-        groupings = [Grouping.of(Contacts.mean(found)) for found in contacts]
+        means = [Contacts.mean(found) for found in contacts]
+        if drawn is not None:
+            means = [mean.with_changes(np.stack(kept)) for mean, kept in zip(means, samples, strict=True)]
+        groupings = [Grouping.of(mean) for mean in means]
         if drawn is None:
             scores = [grouping.certainties[self._number(grouping) - 1] for grouping in groupings]
         else:
@@ -653,7 +656,7 @@ class PoseSegmentation:
             if lasting.all():
                 break
             scattered |= ~lasting[self.grouping_.groups(len(lasting))]
-            self.grouping_ = Grouping.of(Contacts.mean(contacts[best]), scattered)
+            self.grouping_ = Grouping.of(means[best], scattered)
 
     def _lasting(self, poses: Sequence[PoseSignature]) -> BoolArray:
         """(n_segments_,) whether a segment has a part in most poses that is no crumb."""
