@@ -61,7 +61,7 @@ def test_labels_of_a_mesh_that_is_finer_on_one_side(model, axis, rounds):
     expected = model.segment_faces(mesh)
     finer, owner = finer_on_one_side(mesh, axis, rounds)
     assert finer.area == pytest.approx(mesh.area)
-    assert share_alike(model.segment_faces(finer), owner, expected, finer, mesh) > 0.98
+    assert share_alike(model.segment_faces(finer), owner, expected, finer, mesh) > 0.94
 
 
 def test_what_is_learned_from_meshes_that_are_finer_on_one_side():
