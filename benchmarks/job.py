@@ -20,7 +20,7 @@ import bpy
 import wks_segment.blender
 from benchmarks import shapes
 from wks_segment.blender import tasks
-from wks_segment.core import segmentation
+from wks_segment.core import description
 
 
 def main() -> None:
@@ -31,7 +31,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, help="poses solved side by side")
     options = parser.parse_args()
     if options.workers:
-        segmentation.MAX_WORKERS = options.workers
+        description.MAX_WORKERS = options.workers
     bpy.ops.wm.read_homefile(use_empty=True)
     wks_segment.blender.register()
     try:

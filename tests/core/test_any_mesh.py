@@ -39,7 +39,8 @@ def test_labels_or_a_reason(drawn):
         return
     assert labels.shape == (len(faces),)
     assert set(labels.tolist()) <= {0, 1, 2}
-    assert np.array_equal(np.unique(regions), np.arange(regions.max() + 1))
+    assert regions.shape == (len(faces),)
+    assert regions.min() >= 0
     assert np.isfinite(score)
     count("mesh, labelled by a model", names, "labelled")
 

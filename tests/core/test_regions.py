@@ -1,9 +1,8 @@
 import numpy as np
 from shapes import creature, grid, icosphere, together
 
-from wks_segment.core import TriangleMesh, prepare_surface, stiffness_matrix
-from wks_segment.core.laplacian import unit_area_masses
-from wks_segment.core.regions import FaceAdjacency, connected_regions, merge_crumbs, smooth_posteriors
+from wks_segment.core import TriangleMesh
+from wks_segment.core.regions import FaceAdjacency, connected_regions, merge_crumbs
 
 
 def adjacency_of(mesh):
@@ -74,28 +73,3 @@ def test_a_mesh_of_nothing_but_crumbs_stays_as_it_is():
     labels = np.arange(pieces.n_faces) // icosphere(1).n_faces
     cleaned, _ = merge_crumbs(labels, pieces.face_areas, centres_of(pieces), adjacency_of(pieces), 0.9)
     np.testing.assert_array_equal(cleaned, labels)
-
-
-def test_smoothing_keeps_sums_and_does_not_depend_on_the_meshing():
-    results = []
-    for n in (30, 60):
-        mesh = grid(n, n)
-        hard = (mesh.vertices[:, 0] > 0.5).astype(float)
-        smooth = smooth_posteriors(mesh, np.stack([hard, 1 - hard], axis=1), 0.1)
-        np.testing.assert_allclose(smooth.sum(axis=1), 1.0, atol=1e-5)
-        results.append(np.interp(np.linspace(0, 1, 11), mesh.vertices[:: n + 1, 0], smooth[:: n + 1, 0]))
-    np.testing.assert_allclose(results[0], results[1], atol=0.06)
-
-
-def test_smoothing_of_needles_that_single_precision_cannot_hold():
-    random = np.random.default_rng(0)
-    vertices = random.standard_normal((60, 3))
-    faces = np.array([random.choice(60, 3, replace=False) for _ in range(150)])
-    for a, b, c in faces[random.random(150) < 0.5]:
-        vertices[c] = (vertices[a] + vertices[b]) / 2 + 1e-7 * random.standard_normal(3)
-    mesh = prepare_surface(TriangleMesh(vertices, faces), 450).mesh
-    posteriors = random.dirichlet(np.ones(3), mesh.n_vertices)
-    smooth = smooth_posteriors(mesh, posteriors, 0.06)
-    np.testing.assert_allclose(smooth.sum(axis=1), 1, atol=1e-6)
-    system = np.diag(unit_area_masses(mesh)) + 0.06**2 * stiffness_matrix(mesh).toarray()
-    np.testing.assert_allclose(system @ smooth, unit_area_masses(mesh)[:, None] * posteriors, atol=1e-9)

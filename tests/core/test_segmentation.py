@@ -67,8 +67,17 @@ def test_parts_are_connected_and_not_too_small(model):
     regions = model.segment_regions(described)
     mesh = POSES[2]
     adjacency = FaceAdjacency.of(mesh.faces, mesh.vertices)
-    assert np.bincount(regions, weights=mesh.face_areas).min() >= 0.005 * mesh.area
-    assert connected_regions(regions, adjacency).max() == regions.max()
+    names, areas = np.unique(regions), np.bincount(regions, weights=mesh.face_areas)
+    assert areas[names].min() >= 0.005 * mesh.area
+    assert connected_regions(regions, adjacency).max() + 1 == len(names)
+
+
+def test_with_the_papers_setting_regions_are_connected_parts_of_the_components():
+    mesh = POSES[0]
+    model = PoseSegmentation(**SMALL, preset="paper").fit([mesh])
+    adjacency = FaceAdjacency.of(mesh.faces, mesh.vertices)
+    expected = connected_regions(model.segment_faces(mesh), adjacency)
+    np.testing.assert_array_equal(model.segment_regions(mesh), expected)
 
 
 def test_the_thin_end_and_the_body_are_different_parts(model):

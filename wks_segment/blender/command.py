@@ -12,7 +12,7 @@ from typing import Any
 import bpy
 
 from ..core import PoseSegmentation
-from ..core.segmentation import Progress
+from ..core.description import Progress
 from . import demo, files, tasks
 from . import poses as reader
 from .characters import Character, armature_of, group, mesh_objects

@@ -8,8 +8,8 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ..core.description import Progress
 from ..core.mesh import FloatArray, IntArray
-from ..core.segmentation import Progress
 from . import files, tasks
 from . import poses as reader
 from .characters import Character

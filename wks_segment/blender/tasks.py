@@ -13,9 +13,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..core import Connection, PoseSegmentation, PoseSignature, SpectrumError, connect
+from ..core.description import Progress
 from ..core.memory import available_memory
 from ..core.mesh import FloatArray, IntArray
-from ..core.segmentation import DESCRIBED, Progress
+from ..core.segmentation import DESCRIBED
 from . import poses as reader
 from .certainty import certainties, certainty_lines
 from .characters import Character, armature_of, group, mesh_objects

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TextIO
 
-from ..core.segmentation import Progress
+from ..core.description import Progress
 
 
 @contextmanager

@@ -1,11 +1,12 @@
 """The method, without Blender: mesh → surface → laplacian → spectrum → signature → mixture → regions → segmentation."""
 
+from .description import PoseSignature
 from .intrinsic import delaunay
 from .laplacian import mass_matrix, stiffness_matrix
 from .mesh import TriangleMesh
 from .mixture import GaussianMixture, fit_mixture
 from .model_file import ModelFileError
-from .segmentation import PoseSegmentation, PoseSignature
+from .segmentation import PoseSegmentation
 from .signature import heat_kernel_signature, wave_kernel_signature
 from .spectrum import SpectrumError, eigenpairs
 from .surface import Connection, Surface, connect, prepare_surface

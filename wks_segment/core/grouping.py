@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .mesh import BoolArray, FloatArray, IntArray
-from .parts import border_weights, gains_of_joining
 from .regions import FaceAdjacency, merge_crumbs
+from .shape import border_weights
 from .surface import Surface
 
 LEAST_SHARE = 0.01
@@ -27,9 +27,10 @@ CHANGE = 20.0
 EMPTY = 1e-6
 """Area that a component without any counts as."""
 
-
 BEST_WITHIN, MOST_SEGMENTS = 0.06, 16
 """The number of segments, where it is left open: the most, up to this many, that are nearly as certain as any."""
+MOST_CUT = 11.5
+"""Border by area, on average over groups, above which these are pieces of what people see as one."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class Ground:
         """Find the neighbours and weigh their borders."""
         original = surface.original
         adjacency = FaceAdjacency.of(surface.welded_faces, original.vertices)
-        weights, _ = border_weights(surface, adjacency)
+        weights = border_weights(surface, adjacency)
         return cls(surface, adjacency, weights * adjacency.lengths / np.sqrt(original.area))
 
 
@@ -122,11 +123,14 @@ class Grouping:
         posteriors, which is low where wide borders are long. It foretells how well unseen poses will agree.
     by_chance : (K,) array
         What that would be if only the groups' sizes were known.
+    cuts : (K,) array
+        Mean over the groups of weighted border length by area, for a surface of area 1.
     """
 
     pairs: IntArray
     certainties: FloatArray
     by_chance: FloatArray
+    cuts: FloatArray
 
     @classmethod
     def of(cls, contacts: Contacts, scattered: BoolArray | None = None) -> Grouping:
@@ -139,12 +143,14 @@ class Grouping:
         count = len(areas)
         alive = np.ones(count, dtype=bool)
         scattered = np.zeros(count, dtype=bool) if scattered is None else scattered.copy()
-        pairs, certainties, by_chance = np.zeros((count - 1, 2), dtype=np.int64), np.ones(count), np.ones(count)
+        pairs, cuts = np.zeros((count - 1, 2), dtype=np.int64), np.zeros(count)
+        certainties, by_chance = np.ones(count), np.ones(count)
         for step in range(count - 1):
             certainties[count - 1 - step] = np.trace(overlaps)
             by_chance[count - 1 - step] = np.square(overlaps.sum(axis=1)).sum()
             np.fill_diagonal(borders, 0)
-            gain = gains_of_joining(borders, borders.sum(axis=1), areas)
+            cuts[count - 1 - step] = min(np.mean((borders.sum(axis=1) / areas)[alive]), 1 / EMPTY)
+            gain = _gains_of_joining(borders, areas)
             touch = borders > 0
             small = (np.minimum(areas[:, None], areas) < LEAST_SHARE) | scattered[:, None] | scattered
             # The small before the large, then what touches before what does not; each of these outweighs the rest.
@@ -159,7 +165,7 @@ class Grouping:
             areas[i] += areas[j]
             scattered[i] &= scattered[j]
             scattered[j] = alive[j] = False
-        return cls(pairs, certainties, by_chance)
+        return cls(pairs, certainties, by_chance, cuts)
 
     def groups(self, n_groups: int) -> IntArray:
         """(K,) group of each component after as many joins as leave `n_groups`, numbered by their lowest component."""
@@ -182,3 +188,20 @@ class Grouping:
         if not len(curve):
             return 1
         return 2 + int(np.flatnonzero(curve >= curve.max() - BEST_WITHIN)[-1])
+
+    def number_of_wholes(self, most: int) -> int:
+        """The most groups, up to `most`, that are no mere pieces: their borders are short for their areas."""
+        whole = np.flatnonzero(self.cuts[:most] <= MOST_CUT)
+        return max(int(whole[-1]) + 1, min(most, 2))
+
+
+def _gains_of_joining(borders: FloatArray, areas: FloatArray) -> FloatArray:
+    """(K, K) by how much the sum of border by area falls if two of some groups are joined.
+
+    Given (K, K) weighted borders between them and their (K,) areas. Normalized cuts (Shi and Malik, 2000), as
+    Golovinskiy and Funkhouser have them for parts ("Randomized cuts for 3D mesh analysis", 2008, section 4.2).
+    """
+    whole = borders.sum(axis=1)
+    alone = (whole / areas)[:, None] + whole / areas
+    joined = (whole[:, None] + whole - 2 * borders) / (areas[:, None] + areas)
+    return np.asarray(alone - joined)

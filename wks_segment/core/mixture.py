@@ -204,20 +204,25 @@ def _maximise_likelihood(
     tick: Callable[[float], None],
 ) -> tuple[GaussianMixture, float]:
     """EM from (n, K) responsibilities; the mixture and its mean log-likelihood."""
-    responsibilities, previous = start, -np.inf
-    # What both steps need of the samples if covariances are diagonal, once: they come standardised, so that sums of
-    # squares lose no digits.
-    squares = None if covariance_type in ("full", "tied") else samples**2
+    previous = -np.inf
+    squares = None
+    if covariance_type not in ("full", "tied"):
+        # What both steps need of the samples if covariances are diagonal, once. They come standardised, so that sums of
+        # squares lose no digits, also not in single precision, which takes half the time.
+        samples = samples.astype(np.float32)
+        squares = samples**2
+    responsibilities = start.astype(samples.dtype)
+    shares = shares.astype(samples.dtype)
     for i in range(MAX_ITERATIONS):
         tick(i / MAX_ITERATIONS)
         mixture = _maximise(samples, squares, responsibilities * shares[:, None], covariance_type, floor)
         logs = _log_gaussians(samples, squares, mixture.means, mixture.covariances, covariance_type)
-        logs += np.log(mixture.weights)
+        logs += np.log(mixture.weights).astype(logs.dtype)
         highest = logs.max(axis=1, keepdims=True)
         responsibilities = np.exp(logs - highest)
         total = responsibilities.sum(axis=1, keepdims=True)
         responsibilities /= total
-        current = float(shares @ (highest + np.log(total))[:, 0])
+        current = float(shares.astype(np.float64) @ (highest + np.log(total))[:, 0].astype(np.float64))
         if current - previous < TOLERANCE:
             break
         previous = current
@@ -233,21 +238,20 @@ def _maximise(
 ) -> GaussianMixture:
     """M-step for (n, K) masses that sum to 1, with `floor` added to each variance."""
     # An empty component keeps a vanishing weight instead of dividing by zero.
-    weights = masses.sum(axis=0) + 10 * np.finfo(float).tiny ** 0.5
-    means = masses.T @ samples / weights[:, None]
+    weights = masses.sum(axis=0, dtype=np.float64) + 10 * np.finfo(float).tiny ** 0.5
+    means = (masses.T @ samples).astype(np.float64) / weights[:, None]
     covariances: FloatArray
     if squares is None:
         scatter = np.stack([_scatter(samples - mean, mass) for mean, mass in zip(means, masses.T, strict=True)])
         covariances = scatter.sum(axis=0) if covariance_type == "tied" else scatter / weights[:, None, None]
         covariances = covariances + floor * np.eye(samples.shape[1])
+    elif covariance_type == "shared":
+        # Summed over components first: one row of squares instead of one a component.
+        covariances = np.maximum((masses.sum(axis=1) @ squares).astype(np.float64) - weights @ means**2, 0) + floor
     else:
-        scatter = np.maximum(masses.T @ squares - weights[:, None] * means**2, 0)
-        if covariance_type == "shared":
-            covariances = scatter.sum(axis=0) + floor
-        else:
-            covariances = scatter / weights[:, None] + floor
-            if covariance_type == "spherical":
-                covariances = covariances.mean(axis=1)
+        covariances = np.maximum((masses.T @ squares).astype(np.float64) / weights[:, None] - means**2, 0) + floor
+        if covariance_type == "spherical":
+            covariances = covariances.mean(axis=1)
     return GaussianMixture(covariance_type, weights / weights.sum(), means, covariances)
 
 
@@ -276,14 +280,18 @@ def _log_gaussians(
             axis=1,
         )
     else:
-        variances = covariances[:, None] if covariance_type == "spherical" else covariances
-        variances = np.broadcast_to(variances, means.shape)
-        half_log_determinants = np.log(variances).sum(axis=1) / 2
+        # (1, d) if components share it: what only depends on the sample is then computed once for all.
+        variances = covariances[:, None] if covariance_type == "spherical" else np.atleast_2d(covariances)
+        half_log_determinants = np.log(np.broadcast_to(variances, (len(variances), dimension))).sum(axis=1) / 2
         # Σ (x − μ)² / v, multiplied out so that it is two matrix products. Centred first, against cancellation.
         centre = means.mean(axis=0)
         x, mu = (samples - centre, means - centre) if squares is None else (samples, means)
         squared = x**2 if squares is None else squares
-        distances = squared @ (1 / variances).T - 2 * x @ (mu / variances).T + (mu**2 / variances).sum(axis=1)
+        inverse = np.broadcast_to(1 / variances, (len(variances), dimension))
+        dtype = x.dtype
+        distances = squared @ inverse.T.astype(dtype) - 2 * (x @ (mu / variances).T.astype(dtype))
+        distances += (mu**2 / variances).sum(axis=1).astype(dtype)
+        half_log_determinants = half_log_determinants.astype(dtype)
     return np.asarray(-distances / 2 - half_log_determinants - dimension * np.log(2 * np.pi) / 2)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from .mesh import FloatArray, IntArray
 from .mixture import CovarianceType
+from .region_atlas import FIELDS, PLANES
 
 FORMAT = "wks_segment model"
 VERSION = 2
@@ -24,7 +25,7 @@ LARGEST = {"n_segments": 1000, "n_eigenpairs": 5000, "n_energies": 1000}
 LEAST, MOST = 1e-6, 1e6
 """Sizes of numbers in a model: spreads lie between them, their squares bound variances. Beyond, single precision would
 lose a signature's digits, or overflow."""
-MOST_COMPONENTS = 1100
+MOST_COMPONENTS, MOST_REGIONS = 1100, 400
 MAX_BYTES = 20 * 2**20
 """A file above this is not read, nor written: what is in there could take longer than a second. 64 segments with
 diagonal covariances take 300 kB, 8 with full ones 2 MB."""
@@ -68,7 +69,12 @@ def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], Covariance
         if isinstance(parameters[name], int) and parameters[name] > most:
             raise ModelFileError(f"the model is damaged: {name} is {parameters[name]}, more than {most}")
     k, d = _n_components(content, parameters["n_segments"]), parameters["n_energies"]
-    grouped = {} if parameters["preset"] == "paper" else {"joins": (k - 1, 2), "certainties": (k,), "by_chance": (k,)}
+    grouped: dict[str, tuple[int, ...]] = {}
+    if parameters["preset"] != "paper":
+        r = _length(content, "region_segment", MOST_REGIONS)
+        grouped = {"joins": (k - 1, 2), "certainties": (k,), "by_chance": (k,), "cuts": (k,)}
+        grouped |= {"region_segment": (r,), "region_side": (r,), "region_area": (r,), "region_distance": (r, r)}
+        grouped |= {"region_signature": (r, FIELDS), "region_handedness": (r, PLANES), "region_groups": ()}
     shapes = {"shared": (d,), "diag": (k, d), "spherical": (k,), "tied": (d, d), "full": (k, d, d)}
     if covariance_type not in get_args(CovarianceType):
         raise ModelFileError(f"the model is damaged: unknown covariance type {covariance_type!r}")
@@ -81,6 +87,7 @@ def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], Covariance
     }  # fmt: skip
     if grouped:
         _check_joins(arrays["joins"], k)
+        _check_regions(arrays, k)
     for name, array in arrays.items():
         if np.abs(array).max(initial=0) > (MOST**2 if name == "covariances" else MOST):
             raise ModelFileError(f"the model is damaged: {name} has a number of {np.abs(array).max():.3g}, too large")
@@ -102,12 +109,17 @@ def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], Covariance
 
 def _n_components(content: dict[str, Any], n_segments: Any) -> int:
     """Components of the mixture: as many as weights."""
-    weights = content.get("weights")
-    if not isinstance(weights, list) or len(weights) > MOST_COMPONENTS:
-        raise ModelFileError("the model is damaged: weights is missing, or has too many numbers")
-    if n_segments != "auto" and (not isinstance(n_segments, int) or n_segments > len(weights)):
-        raise ModelFileError(f"the model is damaged: {n_segments} segments of {len(weights)} components")
-    return len(weights)
+    count = _length(content, "weights", MOST_COMPONENTS)
+    if n_segments != "auto" and (not isinstance(n_segments, int) or n_segments > count):
+        raise ModelFileError(f"the model is damaged: {n_segments} segments of {count} components")
+    return count
+
+
+def _length(content: dict[str, Any], name: str, most: int) -> int:
+    numbers = content.get(name)
+    if not isinstance(numbers, list) or len(numbers) > most:
+        raise ModelFileError(f"the model is damaged: {name} is missing, or has too many numbers")
+    return len(numbers)
 
 
 def _check_joins(joins: FloatArray, n_components: int) -> None:
@@ -117,6 +129,17 @@ def _check_joins(joins: FloatArray, n_components: int) -> None:
         if not (i in alive and j in alive and i < j):
             raise ModelFileError(f"the model is damaged: joins has the pair {i:g}, {j:g}, which cannot be joined")
         alive.remove(j)
+
+
+def _check_regions(arrays: dict[str, FloatArray], n_components: int) -> None:
+    """Regions belong to groups that are there, have an area, and are left, right or neither."""
+    groups, segment = arrays["region_groups"], arrays["region_segment"]
+    if not (1 <= groups <= n_components and groups % 1 == 0):
+        raise ModelFileError(f"the model is damaged: region_groups is {groups:g}, not a number of groups")
+    if not (len(segment) and (segment % 1 == 0).all() and (segment >= 0).all() and (segment < groups).all()):
+        raise ModelFileError(f"the model is damaged: region_segment has a number that is none of {groups:g} groups")
+    if not np.isin(arrays["region_side"], (-1, 0, 1)).all() or not (arrays["region_area"] > 0).all():
+        raise ModelFileError("the model is damaged: region_side is not -1, 0 or 1, or region_area not positive")
 
 
 def write(path: str | PathLike[str], text: str) -> None:

@@ -1,4 +1,4 @@
-"""From posteriors to clean parts: connected regions of faces with smooth borders and no crumbs."""
+"""Which faces hang together: neighbours, connected regions, crumbs."""
 
 from __future__ import annotations
 
@@ -6,20 +6,11 @@ from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags
+from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
-from .coarse import Level
-from .factor import NestedDissectionFactor, SingularError
-from .laplacian import stiffness_matrix, unit_area_masses
-from .mesh import BoolArray, FloatArray, IntArray, TriangleMesh, edges_of
-
-LARGE = 200_000
-"""Vertices from which posteriors are smoothed on cells."""
-CELLS_PER_LENGTH = 2.0
-"""Cells in a row along the smoothing length."""
+from .mesh import BoolArray, FloatArray, IntArray, edges_of
 
 
 @dataclass(frozen=True)
@@ -62,32 +53,6 @@ class FaceAdjacency:
         most = 1 + max(int(self.pairs.max(initial=0)), int(np.max(pairs, initial=0)))
         here, there = (np.sort(each, axis=1) @ np.array([most, 1]) for each in (self.pairs, pairs))
         return np.isin(here, there)
-
-
-def smooth_posteriors(mesh: TriangleMesh, posteriors: FloatArray, length: float) -> FloatArray:
-    """Average (n, K) posteriors over the surface within about `length` (in units of the square root of its area).
-
-    One implicit step of heat flow, (M + t S) p' = M p with t = length²: the same on any meshing. On a large surface it
-    is taken on cells a fraction of the length wide.
-    """
-    unit = mesh.with_unit_area()
-    level = Level.of(unit)
-    right = level.mass @ posteriors.astype(np.float32)
-    prolongation = None
-    if mesh.n_vertices > LARGE:
-        prolongation, level = level.coarsened(round((CELLS_PER_LENGTH / length) ** 2))
-        right = prolongation.T @ right
-    system = csr_matrix(level.mass + np.float32(length**2) * level.stiffness)
-    try:
-        factor = NestedDissectionFactor(system, level.positions)
-    except SingularError:
-        factor = None
-    if factor is None or factor.n_negative:
-        # Slivers weigh so much more than areas that single precision loses these.
-        exact = diags(unit_area_masses(unit)) + length**2 * stiffness_matrix(unit)
-        return np.asarray(splu(csc_matrix(exact)).solve(unit_area_masses(unit)[:, None] * posteriors))
-    smooth = factor.solve(right)
-    return smooth if prolongation is None else np.asarray(prolongation @ smooth)
 
 
 def connected_regions(labels: IntArray, adjacency: FaceAdjacency) -> IntArray:

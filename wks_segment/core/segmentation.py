@@ -6,101 +6,48 @@ descriptor" (2011).
 
 from __future__ import annotations
 
-import os
-import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
-from dataclasses import dataclass
 from os import PathLike
 from typing import Any, Literal, get_args
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags
 from threadpoolctl import threadpool_limits
 
 from . import model_file
-from .cut import crease_weights, cut_borders
-from .grouping import Contacts, Ground, Grouping
-from .intrinsic import Laplacian, better_triangles
+from .description import PoseDescriber, PoseSignature, Progress
+from .grouping import Grouping
+from .intrinsic import Laplacian
+from .labelling import clean_labels
 from .laplacian import unit_area_masses
-from .memory import available_memory
-from .mesh import BoolArray, FloatArray, IntArray, TriangleMesh
-from .mixture import CovarianceType, GaussianMixture, TooFewSamplesError, drawn_evenly, fit_mixtures
-from .parts import parts
-from .regions import FaceAdjacency, connected_regions, merge_crumbs, smooth_posteriors
-from .signature import wave_kernel_signature_of
-from .spectrum import Accuracy, SpectrumError, memory_needed, seconds_needed
-from .surface import Connection, Pieces, Surface, connect_alike, indicator, prepare_surface
+from .learning import AUTO, MIN_SHARE, SMOOTHING_LENGTH, Candidates, fine_mixtures, of_one_mesh
+from .mesh import FloatArray, IntArray, TriangleMesh
+from .mixture import CovarianceType, GaussianMixture, drawn_evenly, fit_mixtures
+from .region_atlas import FIELDS, RegionAtlas, Regions, side_field, sides_of_parts
+from .regions import FaceAdjacency, connected_regions
+from .smoothing import HeatFlow
+from .spectrum import Accuracy
+from .surface import Pieces
 
 Scaling = Literal["log", "raw"]
 Preset = Literal["default", "paper"]
-Progress = Callable[[str, float], None]
-"""Called with the stage and the fraction of the whole that is done, 0 to 1. An error that it raises ends the work."""
 
-VERTICES_PER_PAIR = 15
-"""A surface is refined until it has this many vertices for each eigenpair: about six to the shortest wavelength."""
-MAX_WORKERS = 4
-"""Poses solved side by side at most: they share the memory's speed."""
-PROGRESS_SECONDS = 0.1
-"""Time between two reports of progress."""
-BESIDE_EIGENPAIRS = 1.5
-"""Time of the whole job in that of its eigenpairs, about."""
 DESCRIBED = 0.8
 """Share of the work that is signatures."""
 MIXED = 0.9
 """Share of the work when the mixture is fitted."""
-AUTO: tuple[CovarianceType, ...] = ("shared", "diag")
-"""Covariances that `covariance_type="auto"` tries on several poses of one mesh; else it takes the first."""
-CANDIDATES = 3
-"""Mixtures of each covariance whose groups are compared."""
-EARNED = 0.8
-"""Another covariance than the first is taken if its labels disagree less than this share as much between the poses."""
-COMPARED = 4_000
-"""Faces on which the labels of the learned poses are compared."""
-REGROUPED = 5
-"""Rounds of joining at most, until no segment is lost as crumbs."""
-COMPONENTS, PER_SEGMENT, MOST_MORE = 24, 3, 64
-"""Components of the mixture: at least so many, and so many for each segment, but at most so many more than segments."""
 SIGNATURE_OFFSET = 1.0
 """Added to the signature, whose mean is 1, before its logarithm: smaller values change much from pose to pose and say
 little, and tiny loose parts take no part in low energies."""
 MOST_SMOOTHNESS = 10
 MAX_SAMPLES = 20_000
 """Vertices that take part in the mixture, spread evenly by area where there are more."""
-MIN_SHARE = 0.005
-"""Smallest part, as a share of the area."""
-MARKED = 0.1
-"""What a border at a marked edge costs, as a share of what it would."""
-SMOOTHING_LENGTH = 0.03
-"""Width of the smoothing along borders at smoothness 1, in units of the square root of the area."""
 PAPER: dict[str, Any] = {
     "covariance_type": "diag", "scaling": "raw", "laplacian": "cotangent", "smoothness": 0.0,
 }  # fmt: skip
 """What `preset="paper"` means: a mixture of the signatures themselves, started once, and its components as labels."""
 
 
-@dataclass(frozen=True)
-class PoseSignature:
-    """One pose, described: what takes the time, to be computed once and used for learning and labelling.
-
-    Attributes
-    ----------
-    surface : Surface
-        The welded and refined surface, with n' vertices.
-    signature : (n', n_energies) array of float
-    n_eigenpairs : int
-        What it was computed from.
-    laplacian : "cotangent" or "delaunay"
-        The triangles that it was computed on.
-    """
-
-    surface: Surface
-    signature: FloatArray
-    n_eigenpairs: int
-    laplacian: Laplacian = "cotangent"
-
-
-class PoseSegmentation:
+class PoseSegmentation(PoseDescriber):
     """Learns a character's parts from several poses and finds them in any pose.
 
     Parameters
@@ -140,6 +87,8 @@ class PoseSegmentation:
         In the space of centred and scaled signatures, with K components.
     grouping_ : Grouping or None
         In which order components make segments; None with the paper's setting.
+    regions_ : RegionAtlas or None
+        The connected regions of the learned poses, and which are left and right; None with the paper's setting.
     n_segments_ : int
         Segments found.
     centre_, spread_ : (n_energies,) arrays
@@ -172,134 +121,12 @@ class PoseSegmentation:
         self.smoothness = smoothness
         self.preset = preset
 
-    def describe(
+    def fit(
         self,
-        mesh: TriangleMesh,
-        connection: Connection | None = None,
-        progress: Callable[[float], None] | None = None,
-    ) -> PoseSignature:
-        """Compute the signature of one pose, to pass it to the other methods in the place of the mesh.
-
-        Parameters
-        ----------
-        mesh : TriangleMesh
-            The pose.
-        connection : Connection, optional
-            `connect(*poses)` of all poses of the same mesh, so that it is one surface in all of them.
-        progress : callable, optional
-            Called with the share of the work that is done, 0 to 1. An error that it raises ends the work.
-
-        Raises
-        ------
-        ValueError
-            If a parameter of the model is out of range or the mesh has no usable face.
-        SpectrumError
-            If the eigenpairs could not be computed.
-        MemoryError
-            If they would need more memory than is free; the message says how much.
-        """
-        self._check_parameters()
-        surface = prepare_surface(mesh, VERTICES_PER_PAIR * self.n_eigenpairs, connection, self.pieces)
-        n_pairs = self.n_eigenpairs + surface.n_components - 1
-        mesh, laplacian = better_triangles(surface.mesh, self._setting("laplacian"))
-        signature = wave_kernel_signature_of(mesh, n_pairs, self.n_energies, self.accuracy, progress)
-        return PoseSignature(surface, signature, self.n_eigenpairs, laplacian)
-
-    def describe_all(
-        self,
-        meshes: Sequence[TriangleMesh],
-        connections: Sequence[Connection] | None = None,
+        meshes: Sequence[TriangleMesh | PoseSignature],
         progress: Progress | None = None,
-        names: Sequence[str] | None = None,
-        workers: int | None = None,
-    ) -> list[PoseSignature]:
-        """`describe` several poses, side by side where there are cores and memory for it.
-
-        Parameters
-        ----------
-        meshes
-            The poses.
-        connections : one a pose, optional
-            See `describe`. If not given, meshes with the same faces count as poses of one mesh.
-        progress
-            Called from the thread that called this.
-        names : optional
-            What to call each pose in messages; "pose 1" and so on if not given.
-        workers : int, optional
-            How many poses at once; as many as there are cores and memory for if not given, at most four.
-
-        Raises
-        ------
-        ValueError, SpectrumError, MemoryError
-            As `describe`; the message begins with the pose's name.
-        """
-        called = list(names) if names is not None else [f"pose {i + 1}" for i in range(len(meshes))]
-        each = connect_alike(meshes, called, self.pieces) if connections is None else connections
-        done = [0.0] * len(meshes)
-        ended = threading.Event()
-
-        def solve(i: int) -> PoseSignature:
-            def tick(share: float) -> None:
-                done[i] = share
-                if ended.is_set():
-                    raise CancelledError
-
-            try:
-                return self.describe(meshes[i], each[i], tick)
-            except (ValueError, SpectrumError, MemoryError) as error:
-                kind = next(kind for kind in (MemoryError, SpectrumError, ValueError) if isinstance(error, kind))
-                raise kind(f"{called[i]}: {error}") from error
-            finally:
-                done[i] = 1.0
-
-        def report() -> None:
-            if progress:
-                current = next((i for i, share in enumerate(done) if share < 1), len(done) - 1)
-                place = f"{current + 1} of {len(done)}"
-                progress(f"pose {place}" if names is None else f"{called[current]} ({place})", sum(done) / len(done))
-
-        if not len(meshes):
-            return []
-        # One BLAS thread a pose: narrow blocks gain nothing from more.
-        with threadpool_limits(1, "blas"), ThreadPoolExecutor(workers or self._workers(meshes)) as pool:
-            futures = [pool.submit(solve, i) for i in range(len(meshes))]
-            try:
-                waiting = set(futures)
-                while waiting:
-                    report()
-                    finished, waiting = wait(waiting, PROGRESS_SECONDS, FIRST_COMPLETED)
-                    for future in finished:
-                        future.result()
-            except BaseException:
-                ended.set()
-                for future in futures:
-                    future.cancel()
-                raise
-        report()
-        return [future.result() for future in futures]
-
-    def estimate(self, meshes: Sequence[TriangleMesh]) -> tuple[float, int]:
-        """Seconds and bytes that poses will take, roughly, before any work is done.
-
-        Side by side they save a fifth of the time at most, which thin shapes more than need: it is not counted.
-        """
-        seconds = sum(seconds_needed(self._refined(mesh), self.n_eigenpairs, self.accuracy) for mesh in meshes)
-        needed = sorted(memory_needed(self._refined(mesh), self.n_eigenpairs, self.accuracy) for mesh in meshes)
-        return BESIDE_EIGENPAIRS * seconds, sum(needed[-self._workers(meshes) :])
-
-    def _refined(self, mesh: TriangleMesh) -> int:
-        """Vertices of the refined surface, about: what is fine already stays, the rest comes on top."""
-        return mesh.n_vertices + VERTICES_PER_PAIR * self.n_eigenpairs
-
-    def _workers(self, meshes: Sequence[TriangleMesh]) -> int:
-        """Poses for which there are cores and memory at once."""
-        largest = max((self._refined(mesh) for mesh in meshes), default=1)
-        needed = memory_needed(largest, self.n_eigenpairs, self.accuracy)
-        free = available_memory()
-        by_memory = MAX_WORKERS if free is None else free // needed
-        return max(1, min(MAX_WORKERS, len(meshes), os.cpu_count() or 1, by_memory))
-
-    def fit(self, meshes: Sequence[TriangleMesh | PoseSignature], progress: Progress | None = None) -> PoseSegmentation:
+        rest: TriangleMesh | None = None,
+    ) -> PoseSegmentation:
         """Learn the parts from one or more poses together.
 
         Parameters
@@ -309,11 +136,15 @@ class PoseSegmentation:
             vertices. One pose alone is allowed, but says nothing of what a pose changes.
         progress
             Called while the poses are described and the mixture is fitted.
+        rest : TriangleMesh, optional
+            The mesh of the first pose at rest, in front of which x points to the character's left, as in Blender and
+            glTF: left and right are told there. In the first pose if not given.
 
         Raises
         ------
         ValueError
-            If there is no pose, a parameter is out of range, or there are fewer vertices than segments.
+            If there is no pose, a parameter is out of range, there are fewer vertices than segments, or `rest` has
+            other faces than the first pose.
         SpectrumError, MemoryError
             If the eigenpairs of a pose could not be computed; see `describe`.
         """
@@ -345,13 +176,24 @@ class PoseSegmentation:
         if self.preset == "paper":
             self.spread_ = np.ones_like(self.spread_)
         samples = (samples - self.centre_) / self.spread_
-        mixtures = self._mixtures(
-            samples, shares, _alike(poses), lambda share: tick("mixture", DESCRIBED + (MIXED - DESCRIBED) * share)
-        )
-        self.mixture_ = mixtures[0]
+
+        def mixing(share: float) -> None:
+            tick("mixture", DESCRIBED + (MIXED - DESCRIBED) * share)
+
+        def grouping(share: float) -> None:
+            tick("parts", MIXED + (1 - MIXED) * share)
+
+        wanted, covariance_type = self._least_components(), self._setting("covariance_type")
         self.grouping_: Grouping | None = None
-        if self.preset != "paper":
-            self._group(poses, mixtures, lambda share: tick("parts", MIXED + (1 - MIXED) * share))
+        self.regions_: RegionAtlas | None = None
+        if self.preset == "paper":
+            (self.mixture_,) = fit_mixtures(samples, shares, wanted, covariance_type, self.random_state, 1, mixing)
+        else:
+            types = AUTO[: 1 + of_one_mesh(poses)] if covariance_type == "auto" else (covariance_type,)
+            mixtures = fine_mixtures(samples, shares, wanted, types, self.n_segments == "auto", mixing)
+            candidates = Candidates(poses, mixtures, self._standardised, self._number)
+            self.mixture_, self.grouping_ = candidates.best(grouping)
+            self.regions_ = self._atlas(poses, rest)
         tick("done", 1.0)
         return self
 
@@ -365,14 +207,14 @@ class PoseSegmentation:
         pose = self._described(mesh)
         return pose.surface.to_vertices(self._posteriors(pose))
 
-    @threadpool_limits.wrap(limits=1, user_api="blas")  # as in _clean
+    @threadpool_limits.wrap(limits=1, user_api="blas")  # as in clean_labels
     def predict_soft(self, mesh: TriangleMesh | PoseSignature) -> FloatArray:
         """(n, n_segments) posteriors as `predict_proba` has them, smoothed as far as the labels of faces are."""
         self._fitted()
         pose = self._described(mesh)
         posteriors, smoothness = self._posteriors(pose), self._setting("smoothness")
         if smoothness > 0:
-            smooth = smooth_posteriors(pose.surface.mesh, posteriors, smoothness * SMOOTHING_LENGTH)
+            smooth = HeatFlow.on(pose.surface.mesh, smoothness * SMOOTHING_LENGTH).smooth(posteriors)
             # Obtuse triangles let the heat flow a little beyond 0 and 1.
             posteriors = np.clip(smooth, 0, 1).astype(np.float64)
             posteriors /= posteriors.sum(axis=1, keepdims=True)
@@ -399,28 +241,21 @@ class PoseSegmentation:
         self._fitted()
         return self._clean([self._described(mesh)], None, min_share)[0]
 
+    @threadpool_limits.wrap(limits=1, user_api="blas")  # as in clean_labels
     def segment_regions(self, mesh: TriangleMesh | PoseSignature, min_share: float | None = None) -> IntArray:
-        """(m,) connected part of each face, numbered 0, 1, …: left and right hand are two.
+        """(m,) connected part of each face: left and right hand are two.
 
-        Cut as a person would: between components, along creases and where the thickness changes, and not within what
-        has neither (see `parts`); without smoothing, the connected parts of the components. Parts under `min_share` of
-        the area belong to the part next to them. Numbered by component first.
+        Region i of one pose is region i of every other, on any meshing: as `regions_` has them, and numbered on from
+        there for what was not learned; a pose may lack one. They are connected parts of segments, of which those whose
+        common border is long for their areas are one here: as whole as people see them. With the paper's setting the
+        connected parts of the components, in the order of these. Parts under `min_share` of the area belong to the
+        part next to them.
         """
         self._fitted()
         pose = self._described(mesh)
-        labels, adjacency = self._clean([pose], None, min_share)
-        if self._setting("smoothness") == 0:
-            return connected_regions(labels, adjacency)
-        original = pose.surface.original
-        own = FaceAdjacency.of(pose.surface.welded_faces, original.vertices)
-        centres = original.vertices[original.faces].mean(axis=1)
-        cut = parts(pose.surface, labels, own)
-        part, tied = merge_crumbs(cut, original.face_areas, centres, own, self._least_share(min_share))
-        region = connected_regions(part, tied)
-        # The component that most of a region's area belongs to decides on its number.
-        shares = np.zeros((int(region.max()) + 1, self.n_segments_))
-        np.add.at(shares, (region, labels), original.face_areas)
-        return np.asarray(np.argsort(np.lexsort((np.arange(len(shares)), shares.argmax(axis=1))))[region])
+        if self.regions_ is None:
+            return connected_regions(*self._clean([pose], None, min_share))
+        return self._named_regions(pose, min_share)
 
     def segment_polygons(
         self,
@@ -466,6 +301,34 @@ class PoseSegmentation:
                 )
         return self._clean(described, polygons, min_share, progress, marked)[0]
 
+    @threadpool_limits.wrap(limits=1, user_api="blas")  # as in clean_labels
+    def polygon_sides(self, pose: TriangleMesh | PoseSignature, polygon_of: IntArray, labels: IntArray) -> IntArray:
+        """Tell left from right where a segment lies on both sides.
+
+        Parameters
+        ----------
+        pose
+            As `segment_polygons` had it, or any one of its poses.
+        polygon_of : (m,) int array
+            The polygon of each triangle, -1 for none.
+        labels : (p,) int array
+            What `segment_polygons` gave.
+
+        Returns
+        -------
+        (p,) int array: 1 for polygons of a part on the left that has one opposite, -1 for those on the right, 0 for
+        others. All 0 with the paper's setting.
+        """
+        self._fitted()
+        described = self._described(pose)
+        if self.regions_ is None:
+            return np.zeros(len(labels), dtype=np.int64)
+        surface = described.surface
+        region = self._named_regions(described, None)
+        known = np.zeros(int(region.max()) + 1, dtype=np.int64)
+        known[: len(self.regions_.side)] = self.regions_.side[: len(known)]
+        return sides_of_parts(surface, side_field(surface, region, known), polygon_of, labels, MIN_SHARE)
+
     def save(self, path: str | PathLike[str]) -> None:
         """Write the fitted model to a JSON file that holds data only.
 
@@ -500,7 +363,9 @@ class PoseSegmentation:
         }  # fmt: skip
         if self.grouping_ is not None:
             arrays["joins"] = self.grouping_.pairs
-            arrays |= {"certainties": self.grouping_.certainties, "by_chance": self.grouping_.by_chance}
+            arrays |= {name: getattr(self.grouping_, name) for name in ("certainties", "by_chance", "cuts")}
+        if self.regions_ is not None:
+            arrays |= self.regions_.arrays()
         return model_file.encode(
             {name: getattr(self, name) for name in model_file.PARAMETERS},
             arrays,
@@ -517,11 +382,11 @@ class PoseSegmentation:
         except (ValueError, TypeError) as error:
             raise model_file.ModelFileError(f"the model has a bad parameter: {error}") from error
         model.centre_, model.spread_ = arrays["centre"], arrays["spread"]
-        model.grouping_ = (
-            Grouping(arrays["joins"].astype(np.int64), arrays["certainties"], arrays["by_chance"])
-            if "joins" in arrays
-            else None
-        )
+        model.grouping_ = model.regions_ = None
+        if "joins" in arrays:
+            order = (arrays[name] for name in ("certainties", "by_chance", "cuts"))
+            model.grouping_ = Grouping(arrays["joins"].astype(np.int64), *order)
+            model.regions_ = RegionAtlas.of_arrays(arrays)
         model.mixture_ = GaussianMixture(covariance_type, arrays["weights"], arrays["means"], arrays["covariances"])
         return model
 
@@ -557,6 +422,10 @@ class PoseSegmentation:
             raise ValueError(f"min_share must be from 0 to below 1, not {min_share!r}")
         return min_share
 
+    def _laplacian(self) -> Literal["auto"] | Laplacian:
+        laplacian: Literal["auto"] | Laplacian = self._setting("laplacian")
+        return laplacian
+
     def _setting(self, name: str) -> Any:
         """What holds for a parameter that the preset may override."""
         return PAPER[name] if self.preset == "paper" else getattr(self, name)
@@ -586,90 +455,6 @@ class PoseSegmentation:
         scaled = self._scaled(signature)  # a new array, or the signature itself; in its own precision
         return np.asarray((scaled - self.centre_.astype(scaled.dtype)) / self.spread_.astype(scaled.dtype))
 
-    def _mixtures(
-        self, samples: FloatArray, shares: FloatArray, alike: bool, tick: Callable[[float], None]
-    ) -> list[GaussianMixture]:
-        """Mixtures that may do."""
-        wanted, covariance_type = self._least_components(), self._setting("covariance_type")
-        if self.preset == "paper":
-            return fit_mixtures(samples, shares, wanted, covariance_type, self.random_state, 1, tick)
-        types = (AUTO if alike else AUTO[:1]) if covariance_type == "auto" else (covariance_type,)
-        found = []
-        for i, each in enumerate(types):
-
-            def part(share: float, begun: int = i) -> None:
-                tick((begun + share) / len(types))
-
-            n_components = min(max(COMPONENTS, PER_SEGMENT * wanted), wanted + MOST_MORE, len(samples))
-            if each in ("tied", "full"):
-                # A finer mixture of these would take minutes, and learn every pose by heart.
-                n_components = max(wanted, COMPONENTS // PER_SEGMENT) if self.n_segments == "auto" else wanted
-            try:
-                found += fit_mixtures(samples, shares, n_components, each, None, CANDIDATES, part)
-            except TooFewSamplesError as error:
-                # A cube has three different vertices at most: no more components than that.
-                n_components = max(wanted, error.distinct)
-                found += fit_mixtures(samples, shares, n_components, each, None, CANDIDATES, part)
-        return found
-
-    @threadpool_limits.wrap(limits=1, user_api="blas")  # as in `_clean`
-    def _group(
-        self, poses: Sequence[PoseSignature], mixtures: list[GaussianMixture], tick: Callable[[float], None]
-    ) -> None:
-        """Keep the mixture whose groups are the most certain, and its grouping."""
-        contacts: list[list[Contacts]] = [[] for _ in mixtures]
-        samples: list[list[FloatArray]] = [[] for _ in mixtures]
-        first = poses[0].surface.original
-        drawn = drawn_evenly(first.face_areas / first.area, COMPARED) if _alike(poses) else None
-        for i, pose in enumerate(poses):
-            tick(i / len(poses))
-            ground, standardised = Ground.of(pose.surface), self._standardised(pose.signature)
-            for mixture, found, kept in zip(mixtures, contacts, samples, strict=True):
-                smooth = smooth_posteriors(pose.surface.mesh, mixture.posteriors(standardised), SMOOTHING_LENGTH)
-                of_faces = pose.surface.to_faces(smooth)
-                found.append(Contacts.on(ground, of_faces))
-                if drawn is not None:
-                    kept.append(of_faces[drawn])
-        means = [Contacts.mean(found) for found in contacts]
-        if drawn is not None:
-            means = [mean.with_changes(np.stack(kept)) for mean, kept in zip(means, samples, strict=True)]
-        groupings = [Grouping.of(mean) for mean in means]
-        if drawn is None:
-            scores = [grouping.certainties[self._number(grouping) - 1] for grouping in groupings]
-        else:
-            scores = []
-            for grouping, kept in zip(groupings, samples, strict=True):
-                number = self._number(grouping)
-                labels = np.stack([(each @ np.eye(number)[grouping.groups(number)]).argmax(axis=1) for each in kept])
-                scores.append(float((labels[:, None] == labels).mean()))
-        # What has more to fit must earn it.
-        first_type = mixtures[0].covariance_type
-        losses = [
-            (1 - score) / (1 if mixture.covariance_type == first_type else EARNED)
-            for score, mixture in zip(scores, mixtures, strict=True)
-        ]
-        best = int(np.argmin(losses))
-        self.mixture_, self.grouping_ = mixtures[best], groupings[best]
-        scattered = np.zeros(len(self.mixture_.weights), dtype=bool)
-        for _ in range(REGROUPED):
-            lasting = self._lasting(poses)
-            if lasting.all():
-                break
-            scattered |= ~lasting[self.grouping_.groups(len(lasting))]
-            self.grouping_ = Grouping.of(means[best], scattered)
-
-    def _lasting(self, poses: Sequence[PoseSignature]) -> BoolArray:
-        """(n_segments_,) whether a segment has a part in most poses that is no crumb."""
-        seen = np.zeros(self.n_segments_)
-        for pose in poses:
-            original = pose.surface.original
-            smooth = smooth_posteriors(pose.surface.mesh, self._posteriors(pose), SMOOTHING_LENGTH)
-            labels = pose.surface.to_faces(smooth).argmax(axis=1)
-            region = connected_regions(labels, FaceAdjacency.of(pose.surface.welded_faces, original.vertices))
-            large = np.bincount(region, original.face_areas) >= MIN_SHARE * original.area
-            seen[np.unique(labels[large[region]])] += 1
-        return np.asarray(seen >= len(poses) / 2)
-
     def _least_components(self) -> int:
         return 2 if isinstance(self.n_segments, str) else self.n_segments
 
@@ -682,15 +467,14 @@ class PoseSegmentation:
         mixture = self._fitted()
         return len(mixture.weights) if self.grouping_ is None else self._number(self.grouping_)
 
-    def _posteriors(self, pose: PoseSignature) -> FloatArray:
-        """(n', n_segments_) sums of the posteriors of each segment's components."""
+    def _posteriors(self, pose: PoseSignature, n_groups: int | None = None) -> FloatArray:
+        """(n', n_groups) sums of the posteriors of each group's components; of each segment's if not given."""
         posteriors = self._fitted().posteriors(self._standardised(pose.signature))
         if self.grouping_ is None:
             return posteriors
-        group = self.grouping_.groups(self.n_segments_)
-        return np.asarray(posteriors @ np.eye(self.n_segments_, dtype=posteriors.dtype)[group])
+        n_groups = n_groups or self.n_segments_
+        return np.asarray(posteriors @ np.eye(n_groups, dtype=posteriors.dtype)[self.grouping_.groups(n_groups)])
 
-    @threadpool_limits.wrap(limits=1, user_api="blas")  # on arrays this small, threads wait for each other
     def _clean(
         self,
         poses: Sequence[PoseSignature],
@@ -698,84 +482,48 @@ class PoseSegmentation:
         min_share: float | None,
         progress: Callable[[float], None] | None = None,
         marked: IntArray | None = None,
+        n_groups: int | None = None,
     ) -> tuple[IntArray, FaceAdjacency]:
-        """Labels of polygons (None: each triangle is one) from the mean posterior of all poses, and neighbours."""
-        length = self._setting("smoothness") * SMOOTHING_LENGTH
-        least = self._least_share(min_share)
-        if polygons is None:
-            polygons = [np.arange(pose.surface.original.n_faces) for pose in poses]
-        n_polygons = 1 + max(int(polygon_of.max()) for polygon_of in polygons)
-        posteriors = np.zeros((n_polygons, self.n_segments_))
-        areas, poses_seen = np.zeros(n_polygons), np.zeros(n_polygons)
-        layouts = []
-        for pose, polygon_of in zip(poses, polygons, strict=True):
-            surface, original = pose.surface, pose.surface.original
-            sum_over = indicator(np.where(polygon_of < 0, n_polygons, polygon_of), n_polygons + 1)[:n_polygons]
-            # A triangle without area still speaks, if very softly, or its polygon would have no label.
-            weight = original.face_areas / original.area + np.finfo(float).eps
-            total = sum_over @ weight
-            seen = total > 0
-            mean = diags(1 / np.where(seen, total, 1)) @ sum_over @ diags(weight)
-            of_vertices = self._posteriors(pose)
-            if length > 0:
-                of_vertices = smooth_posteriors(surface.mesh, of_vertices, length)
-            posteriors += mean @ surface.to_faces(of_vertices)
-            areas += total * seen
-            poses_seen += seen
-            layouts.append(_Layout.of(surface, polygon_of, mean, length > 0))
-            if progress:
-                progress(len(layouts) / len(poses))
-        # Of one mesh the borders are the same in every pose; modifiers may hide some of them in one.
-        layout = max(layouts, key=lambda layout: len(layout.adjacency.pairs))
-        others = sum(other.centres for other in layouts) / np.maximum(poses_seen, 1)[:, None]
-        centres = np.where(layout.seen[:, None], layout.centres, others)
-        areas /= np.maximum(poses_seen, 1)
-        posteriors /= np.maximum(poses_seen, 1)[:, None]
-        labels = np.where(poses_seen > 0, posteriors.argmax(axis=1), -1)
-        adjacency = layout.adjacency
-        if length > 0:
-            weights = layout.weights
-            if marked is not None:
-                weights = np.where(adjacency.among(marked), MARKED * weights, weights)
-            labels = cut_borders(posteriors, areas, centres, adjacency, weights, length, labels)
-        return merge_crumbs(labels, areas, centres, adjacency, least)
+        """Labels of polygons (None: each triangle is one), and neighbours; see `clean_labels`."""
+        return clean_labels(
+            [pose.surface for pose in poses],
+            lambda i: self._posteriors(poses[i], n_groups),
+            polygons,
+            self._setting("smoothness") * SMOOTHING_LENGTH,
+            self._least_share(min_share),
+            progress,
+            marked,
+        )
 
+    def _fields(self, pose: PoseSignature) -> FloatArray:
+        """(n', FIELDS) the signature along the axes on which the components lie farthest apart."""
+        mixture = self._fitted()
+        axes = np.linalg.eigh((mixture.means * mixture.weights[:, None]).T @ mixture.means)[1][:, ::-1][:, :FIELDS]
+        # Which way an axis points is up to the library; a model must mean the same everywhere.
+        axes *= np.sign(axes[np.abs(axes).argmax(axis=0), np.arange(axes.shape[1])])
+        fields = self._standardised(pose.signature) @ axes
+        return np.pad(fields, ((0, 0), (0, FIELDS - axes.shape[1])))
 
-def _alike(poses: Sequence[PoseSignature]) -> bool:
-    """Whether several poses are of one mesh."""
-    faces = [pose.surface.original.faces for pose in poses]
-    return len(poses) > 1 and all(np.array_equal(faces[0], other) for other in faces[1:])
+    @threadpool_limits.wrap(limits=1, user_api="blas")  # as in clean_labels
+    def _atlas(self, poses: Sequence[PoseSignature], rest: TriangleMesh | None) -> RegionAtlas:
+        """The connected regions of the learned poses, and which are left and right."""
+        first = poses[0].surface.original
+        if rest is not None and not np.array_equal(rest.faces, first.faces):
+            raise ValueError("rest has other faces than the first pose: pass the same mesh, in its rest position")
+        assert self.grouping_ is not None
+        n_groups = self.grouping_.number_of_wholes(self.n_segments_)
+        together = [poses] if of_one_mesh(poses) else [[pose] for pose in poses]
+        found, traits = [], []
+        for alike in together:
+            regions = Regions.of(*self._clean(alike, None, None, n_groups=n_groups), alike[0].surface.original)
+            found.append(regions)
+            traits += [regions.traits(pose.surface, self._fields(pose)) for pose in alike]
+        return RegionAtlas.learned(n_groups, traits, found[0].centres(first if rest is None else rest))
 
-
-@dataclass(frozen=True)
-class _Layout:
-    """Where the p polygons of a mesh lie in one pose, of area 1.
-
-    Attributes
-    ----------
-    seen : (p,) bool array
-        Whether any triangle is of the polygon.
-    centres : (p, 3) array
-        0 where not seen.
-    adjacency : FaceAdjacency
-        Of the polygons.
-    weights : (b,) array
-        What each border costs by its length, see `crease_weights`.
-    """
-
-    seen: BoolArray
-    centres: FloatArray
-    adjacency: FaceAdjacency
-    weights: FloatArray
-
-    @classmethod
-    def of(cls, surface: Surface, polygon_of: IntArray, mean: csr_matrix, weighed: bool) -> _Layout:
-        """Given the polygon of each triangle and the (p, m) mean of triangles over each polygon."""
-        original = surface.original
-        unit = np.sqrt(original.area)
-        adjacency = FaceAdjacency.of(surface.welded_faces, original.vertices / unit)
-        across = adjacency.across(polygon_of)
-        weights = crease_weights(surface, adjacency) if weighed else np.ones(len(adjacency.lengths))
-        centres = np.asarray(mean @ (original.vertices[original.faces].mean(axis=1) / unit))
-        seen = np.asarray(mean.sum(axis=1)).ravel() > 0
-        return cls(seen, centres, adjacency.between_polygons(polygon_of), weights[across])
+    def _named_regions(self, pose: PoseSignature, min_share: float | None) -> IntArray:
+        """(m,) region of each face, numbered as in the atlas, and on from there."""
+        assert self.regions_ is not None
+        labels, adjacency = self._clean([pose], None, min_share, n_groups=self.regions_.n_groups)
+        regions = Regions.of(labels, adjacency, pose.surface.original)
+        names = self.regions_.named(regions.traits(pose.surface, self._fields(pose)))
+        return regions.numbered(names, len(self.regions_.side))

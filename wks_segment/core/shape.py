@@ -13,7 +13,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from .mesh import BoolArray, FloatArray, IntArray, unique_edges
-from .regions import FaceAdjacency, smooth_posteriors
+from .regions import FaceAdjacency
+from .smoothing import HeatFlow
 from .surface import Surface, indicator
 
 FINE, COARSE = 0.012, 0.02
@@ -30,6 +31,12 @@ SLACK = 0.01
 """How much further than the nearest place the one may be that is found, as a fraction."""
 MOST_BALLS = 20_000
 """Vertices at which thickness is measured; others take it from the nearest of these."""
+CREASE, MOST_CONCAVE, MOST_CONVEX = 0.4, 15.0, 2.0
+"""Weight of a border by e to this times its curvature, which is taken between these bounds."""
+STEP, MOST_STEP = 0.1, 40.0
+"""Weight of a border by e to minus this times the change of log thickness over the unit of length, bounded."""
+SHORTEST = 3e-3
+"""Distance between faces from which on changes count as changes over that distance."""
 FLAT = 0.003
 """Added to thickness before its logarithm, in units of the square root of the area: a sheet has none."""
 
@@ -71,7 +78,7 @@ def vertex_normals(surface: Surface) -> FloatArray:
 
 def smooth_normals(surface: Surface, normals: FloatArray, length: float) -> FloatArray:
     """(n', 3) unit normals, averaged over about `length`."""
-    return _unit(np.asarray(smooth_posteriors(surface.mesh, normals, length), dtype=np.float64))
+    return _unit(HeatFlow.on(surface.mesh, length).smooth(normals).astype(np.float64))
 
 
 def curvature_across(surface: Surface, normals: FloatArray, adjacency: FaceAdjacency) -> FloatArray:
@@ -113,7 +120,20 @@ def log_thickness(surface: Surface, normals: FloatArray) -> FloatArray:
     if step > 1:
         radius = radius[tree.query(places)[1]]
     logs = np.log(radius + FLAT)[:, None]
-    return np.asarray(smooth_posteriors(mesh, logs, THICKNESS_LENGTH)[:, 0], dtype=np.float64)
+    return HeatFlow.on(mesh, THICKNESS_LENGTH).smooth(logs)[:, 0].astype(np.float64)
+
+
+def border_weights(surface: Surface, adjacency: FaceAdjacency) -> FloatArray:
+    """(p,) weight of the border between neighbours: 1 where nothing speaks for a cut, less where people cut."""
+    original = surface.original
+    normals = vertex_normals(surface)
+    thickness = surface.to_faces(log_thickness(surface, smooth_normals(surface, normals, FINE))[:, None])[:, 0]
+    curvature = curvature_across(surface, smooth_normals(surface, normals, COARSE), adjacency)
+    centres = original.vertices[original.faces].mean(axis=1) / np.sqrt(original.area)
+    a, b = adjacency.pairs.T
+    distances = np.maximum(np.linalg.norm(centres[a] - centres[b], axis=1), SHORTEST)
+    step = np.minimum(np.abs(thickness[a] - thickness[b]) / distances, MOST_STEP)
+    return np.asarray(np.exp(CREASE * np.clip(curvature, -MOST_CONCAVE, MOST_CONVEX) - STEP * step))
 
 
 def _touching(

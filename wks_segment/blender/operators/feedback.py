@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import bpy
 
 from ...core import PoseSegmentation
-from ...core.segmentation import Progress
+from ...core.description import Progress
 from .. import tasks
 from ..characters import mesh_objects, why_no_mesh
 from ..errors import TooLargeError, UserError

@@ -1,0 +1,128 @@
+import numpy as np
+import pytest
+from shapes import icosphere
+
+from wks_segment.core import PoseSegmentation, TriangleMesh
+from wks_segment.core.region_atlas import sides
+
+LIMBS = {
+    "head": ((0, 0, 1), 1.2, 0.35), "left arm": ((1, 0, 0.3), 2.5, 0.2), "right arm": ((-1, 0, 0.3), 2.5, 0.2),
+    "left leg": ((0.5, 0, -1), 2.5, 0.25), "right leg": ((-0.5, 0, -1), 2.5, 0.25), "nose": ((0, -0.7, 0.7), 0.5, 0.2),
+    "tail": ((0, 0.9, -0.3), 0.7, 0.2),
+}  # fmt: skip
+
+
+def figure(left=0.0, right=0.0, subdivisions=4):
+    """A body that looks towards −y, as in Blender, with arms and legs; `left` and `right` (radians) lift a side."""
+    sphere = icosphere(subdivisions)
+    points = sphere.vertices.copy()
+    for axis, length, width in LIMBS.values():
+        unit = np.array(axis) / np.linalg.norm(axis)
+        angle = np.arccos(np.clip(sphere.vertices @ unit, -1, 1))
+        points = points + length * np.exp(-((angle / width) ** 2))[:, None] * unit
+    # Beyond the body either side turns about y, more the further out: nearly isometric.
+    out = np.maximum(np.abs(points[:, 0]) - 0.8, 0)
+    turn = np.where(points[:, 0] > 0, left, -right) * out / 2
+    x, y, z = points.T
+    posed = np.stack([x * np.cos(turn) + z * np.sin(turn), y, z * np.cos(turn) - x * np.sin(turn)], axis=1)
+    return TriangleMesh(posed, sphere.faces)
+
+
+def limb(name, subdivisions=4):
+    """Faces at the end of a limb."""
+    sphere = icosphere(subdivisions)
+    axis = np.array(LIMBS[name][0]) / np.linalg.norm(LIMBS[name][0])
+    return np.arccos(np.clip(sphere.vertices[sphere.faces].mean(axis=1) @ axis, -1, 1)) < 0.15
+
+
+def name_of(names, faces):
+    values, counts = np.unique(names[faces], return_counts=True)
+    return int(values[counts.argmax()])
+
+
+@pytest.fixture(scope="module")
+def model():
+    poses = [figure(0.0, 0.0), figure(0.5, 0.1), figure(-0.3, 0.6)]
+    return PoseSegmentation(6, n_eigenpairs=100, n_energies=60).fit(poses)
+
+
+def test_left_and_right_are_two_regions_and_the_same_two_in_unseen_poses(model):
+    usual = model.segment_regions(figure())
+    for left, right in ((0.4, -0.4), (-0.5, 0.5), (0.0, 0.7)):
+        mesh = figure(left, right)
+        found = model.segment_regions(mesh)
+        assert np.average(found == usual, weights=mesh.face_areas) > 0.93
+        for pair in (("left arm", "right arm"), ("left leg", "right leg")):
+            names = [name_of(found, limb(one)) for one in pair]
+            assert names == [name_of(usual, limb(one)) for one in pair]
+            assert names[0] != names[1]
+
+
+def test_names_are_the_same_on_another_meshing_in_another_place_and_inside_out(model):
+    usual = model.segment_regions(figure())
+    fine = figure(0.3, -0.2, 5)
+    turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    order = np.random.default_rng(0).permutation(fine.n_vertices)
+    moved = TriangleMesh(3 * (fine.vertices @ turn)[order] + 5, np.argsort(order)[fine.faces][:, ::-1])
+    found = model.segment_regions(moved)
+    for one in ("left arm", "right arm", "left leg", "right leg", "head"):
+        assert name_of(found, limb(one, 5)) == name_of(usual, limb(one))
+
+
+def test_a_mirrored_body_has_its_left_where_the_other_had_its_right(model):
+    usual = model.segment_regions(figure(0.4, 0.0))
+    mesh = figure(0.4, 0.0)
+    mirrored = model.segment_regions(TriangleMesh(mesh.vertices * (-1, 1, 1), mesh.faces[:, ::-1]))
+    assert name_of(mirrored, limb("left arm")) == name_of(usual, limb("right arm"))
+    assert name_of(mirrored, limb("right leg")) == name_of(usual, limb("left leg"))
+
+
+def test_left_is_where_x_points(model):
+    names, side = model.segment_regions(figure()), model.regions_.side
+    for one in ("arm", "leg"):
+        assert side[name_of(names, limb(f"left {one}"))] == 1
+        assert side[name_of(names, limb(f"right {one}"))] == -1
+    assert side[name_of(names, limb("head"))] == 0
+
+
+def test_sides_are_told_at_rest_if_that_is_given():
+    turned = [TriangleMesh(mesh.vertices * (-1, -1, 1), mesh.faces) for mesh in (figure(0.2, 0.1), figure(0.5, 0.0))]
+    fitted = PoseSegmentation(6, n_eigenpairs=100, n_energies=60).fit(turned, rest=figure())
+    names = fitted.segment_regions(turned[0])
+    assert fitted.regions_.side[name_of(names, limb("left arm"))] == 1
+    with pytest.raises(ValueError, match="rest has other faces than the first pose"):
+        PoseSegmentation(6, n_eigenpairs=100, n_energies=60).fit(turned, rest=figure(subdivisions=3))
+
+
+def test_polygons_of_parts_on_both_sides_have_a_side(model):
+    mesh = figure(0.3, 0.1)
+    polygon_of = np.arange(mesh.n_faces)
+    labels = model.segment_polygons([mesh], [polygon_of])
+    side = model.polygon_sides(mesh, polygon_of, labels)
+    for one in ("arm", "leg"):
+        assert (side[limb(f"left {one}")] == 1).all()
+        assert (side[limb(f"right {one}")] == -1).all()
+    assert (side[limb("head")] == 0).all()
+
+
+def test_a_saved_model_gives_the_same_names(model, tmp_path):
+    model.save(tmp_path / "model.json")
+    mesh = figure(0.1, 0.5)
+    np.testing.assert_array_equal(
+        PoseSegmentation.load(tmp_path / "model.json").segment_regions(mesh), model.segment_regions(mesh)
+    )
+
+
+def test_what_was_not_learned_is_numbered_on(model):
+    mesh = figure()
+    known = len(model.regions_.side)
+    regions = model.segment_regions(mesh, min_share=0.0)
+    areas = np.bincount(regions, weights=mesh.face_areas)
+    assert areas[:known].sum() > 0.9 * mesh.area
+    assert (areas[known:] > 0).all()
+
+
+def test_sides_need_one_of_the_same_segment_opposite():
+    centres = np.array([(1, 0, 0), (-1, 0.1, 0), (0.01, 0, 1), (0.9, 0, -2), (-0.9, 0, -2), (2, 0, 3)])
+    assert sides(centres, np.array([0, 0, 1, 2, 2, 3])).tolist() == [1, -1, 0, 1, -1, 0]
+    assert sides(centres, np.array([0, 1, 1, 2, 2, 3])).tolist() == [0, 0, 0, 1, -1, 0]

@@ -1,0 +1,376 @@
+"""The same name for the same region in every pose: which of several alike it is, and whether left or right.
+
+Signatures are the same on left and right. The images of two mirrored regions in signature space are the same, too, but
+passed through in opposite senses: for two functions f and g of the signature, df ∧ dg is the signed area that a face
+covers in the plane (f, g), and its sum, weighed by a function that is positive near a region and negative near those
+alike, tells these apart: left from right by their surroundings, on any meshing and in any pose. After Ren, Poulenard,
+Wonka and Ovsjanikov, "Continuous and orientation-preserving correspondences via functional maps" (2018), whose operator
+keeps a map from turning left into right. Here there is no map, only a few numbers a region.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.sparse import coo_matrix
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
+
+from .laplacian import unit_area_masses
+from .mesh import FloatArray, IntArray, TriangleMesh
+from .regions import FaceAdjacency, connected_regions
+from .shape import outward
+from .smoothing import HeatFlow
+from .surface import Surface
+
+FIELDS = 6
+"""Functions of the signature that regions are told apart by."""
+PLANES = FIELDS * (FIELDS - 1) // 2
+REACH = 0.3
+"""How far a region's surroundings reach, in units of the square root of the area."""
+SIGNATURE, DISTANCE = 2.0, 0.1
+"""Weight of a difference of mean signature, and difference of distance that counts 1, beside that of log area."""
+LEAST_OVERLAP = 1e-6
+"""Regions whose heat overlaps less than this are as far apart as that."""
+IMPOSSIBLE = 1e6
+"""What it costs to take a region for one of another segment."""
+SWEEPS = 3
+"""Rounds over all segments in which each is matched again, given the others."""
+MOST_REGIONS = 200
+"""Regions of a pose that are told apart, the largest ones."""
+ALIKE = 0.5
+"""Parts on two sides are one part twice if the smaller has at least this share of the larger one's area."""
+MIDDLE = 0.05
+"""Regions nearer than this to each other, across the mirror plane, are neither left nor right."""
+
+
+@dataclass(frozen=True)
+class Regions:
+    """Connected regions of a pose.
+
+    Attributes
+    ----------
+    region : (m,) int array
+        Of each face: the r largest are numbered 0, 1, …, r − 1, and others on from there.
+    segment : (r,) int array
+        Segment of each of those.
+    """
+
+    region: IntArray
+    segment: IntArray
+
+    @classmethod
+    def of(cls, labels: IntArray, adjacency: FaceAdjacency, original: TriangleMesh) -> Regions:
+        """Given the segment of each face of a mesh, and which faces hang together."""
+        region = connected_regions(labels, adjacency)
+        segment_of = np.zeros(int(region.max()) + 1, dtype=np.int64)
+        segment_of[region] = labels
+        largest = np.argsort(-np.bincount(region, original.face_areas), kind="stable")[:MOST_REGIONS]
+        order = np.append(np.sort(largest), np.setdiff1d(np.arange(len(segment_of)), largest))
+        return cls(np.argsort(order)[region], segment_of[np.sort(largest)])
+
+    def traits(self, surface: Surface, fields: FloatArray) -> Traits:
+        """What tells the r largest apart in a pose, given the (n', FIELDS) fields on its surface."""
+        return Traits.of(surface, fields, np.where(self.region < len(self.segment), self.region, -1), self.segment)
+
+    def centres(self, mesh: TriangleMesh) -> FloatArray:
+        """(r, 3) centre of each of the r largest in units of the square root of the area; x from the middle."""
+        places = mesh.vertices[mesh.faces].mean(axis=1) / np.sqrt(mesh.area)
+        middle = np.average(places[:, 0], weights=mesh.face_areas)
+        count = int(self.region.max()) + 1
+        weights = mesh.face_areas + np.finfo(float).tiny
+        sums = np.stack([np.bincount(self.region, weights * axis, count) for axis in places.T], axis=1)
+        centres = sums / np.bincount(self.region, weights, count)[:, None]
+        return np.asarray(centres[: len(self.segment)] - (middle, 0, 0))
+
+    def numbered(self, names: IntArray, n_known: int) -> IntArray:
+        """(m,) name of each face's region, given those of the r largest; others are numbered on."""
+        others = int(self.region.max()) + 1 - len(names)
+        first = max(n_known, int(names.max()) + 1)
+        return np.append(names, first + np.arange(others))[self.region]
+
+
+@dataclass(frozen=True)
+class Traits:
+    """What tells the r connected regions of a pose apart. None of it depends on the pose or the meshing.
+
+    Attributes
+    ----------
+    segment : (r,) int array
+    area : (r,) array
+        Share of the whole.
+    signature : (r, FIELDS) array
+        Mean over the region.
+    handedness : (r, PLANES) array
+        Σ over faces of h df ∧ dg for all pairs of fields; h is near 1 at the region and near −1 at the others of its
+        segment. The opposite at the mirrored region.
+    distance : (r, r) array
+        Between regions, from how their heat overlaps (Varadhan, 1967), in units of the square root of the area.
+    """
+
+    segment: IntArray
+    area: FloatArray
+    signature: FloatArray
+    handedness: FloatArray
+    distance: FloatArray
+
+    @classmethod
+    def of(cls, surface: Surface, fields: FloatArray, region: IntArray, segment: IntArray) -> Traits:
+        """Describe regions of one pose.
+
+        Parameters
+        ----------
+        surface : Surface
+            With n' vertices and m original faces.
+        fields : (n', FIELDS) array
+            Functions of the signature.
+        region : (m,) int array
+            Region of each face, numbered 0, 1, …, r − 1; -1 for one of none.
+        segment : (r,) int array
+            Segment of each region.
+        """
+        mesh, original = surface.mesh, surface.original
+        count = len(segment)
+        area = np.bincount(region[region >= 0], original.face_areas[region >= 0], count) / original.area
+        masses = unit_area_masses(mesh)
+        inside = _at_vertices(surface, region, count)
+        heat = HeatFlow.on(mesh, REACH).smooth(inside).astype(np.float64)
+        weighed = inside * masses[:, None]
+        signature = weighed.T @ fields / np.maximum(weighed.sum(axis=0), LEAST_OVERLAP)[:, None]
+        against = np.where(segment[:, None] == segment, -1.0, 0.0)
+        np.fill_diagonal(against, 0)
+        against /= np.maximum(-against.sum(axis=0), 1)
+        np.fill_diagonal(against, (against != 0).any(axis=0))
+        handedness = (heat @ against)[mesh.faces].mean(axis=1).T @ _signed_areas(mesh, fields)
+        overlap = heat.T @ (heat * masses[:, None]) / masses.sum()
+        size = np.sqrt(np.maximum(area, LEAST_OVERLAP))
+        distance = -REACH * np.log(np.maximum(overlap / np.outer(size, size), LEAST_OVERLAP))
+        return cls(segment, np.maximum(area, LEAST_OVERLAP), signature, handedness, distance)
+
+
+@dataclass(frozen=True)
+class RegionAtlas:
+    """The regions that were learned, and how to know them again.
+
+    Attributes
+    ----------
+    n_groups : int
+        Groups of components whose connected regions they are.
+    traits : Traits
+        Means over the learned poses.
+    side : (r,) int array
+        1: left, which is +x as in Blender; −1: right; 0: neither.
+    """
+
+    n_groups: int
+    traits: Traits
+    side: IntArray
+
+    @classmethod
+    def learned(cls, n_groups: int, poses: Sequence[Traits], centres: FloatArray) -> RegionAtlas:
+        """From one or several poses, and the (r, 3) centres of the first one's regions, best at rest."""
+        atlas = cls(n_groups, poses[0], sides(centres, poses[0].segment))
+        # A mean over poses finds regions of each more surely than the first pose does.
+        for _ in range(2):
+            names = [atlas.named(pose) for pose in poses]
+            atlas = cls(n_groups, _mean(atlas.traits, poses, names), atlas.side)
+        return atlas
+
+    def arrays(self) -> dict[str, FloatArray | IntArray]:
+        """What a file keeps; see `of_arrays`."""
+        of_traits = {f"region_{name}": getattr(self.traits, name) for name in Traits.__dataclass_fields__}
+        return {"region_groups": np.array(self.n_groups), "region_side": self.side, **of_traits}
+
+    @classmethod
+    def of_arrays(cls, arrays: Mapping[str, FloatArray]) -> RegionAtlas:
+        """From what `arrays` gave."""
+        segment, side = (arrays[f"region_{name}"].astype(np.int64) for name in ("segment", "side"))
+        area, signature, handedness, distance = (
+            arrays[f"region_{name}"] for name in ("area", "signature", "handedness", "distance")
+        )
+        traits = Traits(segment, area, signature, handedness, distance)
+        return cls(int(arrays["region_groups"]), traits, side)
+
+    def named(self, found: Traits) -> IntArray:
+        """(r',) the atlas' region that each found one is; those that are none are numbered on from there.
+
+        Within each segment as the differences are smallest in sum (Hungarian method): of area, mean signature,
+        handedness, and of distance to the regions that have a name. The surest segment comes first.
+        """
+        known = self.traits
+        alone = self._differences(found)
+        name = np.full(len(found.segment), -1)
+        open_segments = {int(s) for s in np.unique(found.segment) if (known.segment == s).any()}
+        ours = {s: np.flatnonzero(known.segment == s) for s in open_segments}
+        theirs = {s: np.flatnonzero(found.segment == s) for s in open_segments}
+
+        def costs(s: int) -> FloatArray:
+            return alone[np.ix_(ours[s], theirs[s])] + self._displacements(found, name, ours[s], theirs[s])
+
+        def settle(s: int) -> None:
+            rows, columns = linear_sum_assignment(costs(s))
+            name[theirs[s]] = -1
+            name[theirs[s][columns]] = ours[s][rows]
+
+        every = sorted(open_segments)
+        while open_segments:
+            surest = max(sorted(open_segments), key=lambda s: _margin(costs(s)))
+            settle(surest)
+            open_segments.remove(surest)
+        for _ in range(SWEEPS):
+            before = name.copy()
+            for s in every:
+                settle(s)
+            if (name == before).all():
+                break
+        new = name < 0
+        name[new] = len(known.segment) + np.arange(np.count_nonzero(new))
+        return name
+
+    def _differences(self, found: Traits) -> FloatArray:
+        """(r, r') how unlike each known and each found region are, by themselves."""
+        known = self.traits
+        scale = np.sqrt(np.mean(np.sum(known.handedness**2, axis=1))) or 1.0
+        areas = np.subtract.outer(np.log(known.area), np.log(found.area)) ** 2
+        signatures = cdist(known.signature, found.signature, "sqeuclidean") * SIGNATURE**2 / FIELDS
+        hands = cdist(known.handedness, found.handedness, "sqeuclidean") / scale**2
+        return np.asarray(areas + signatures + hands)
+
+    def _displacements(self, found: Traits, name: IntArray, ours: IntArray, theirs: IntArray) -> FloatArray:
+        """(len(ours), len(theirs)) by how much distances to regions with a name differ, those of `theirs` apart."""
+        placed = np.setdiff1d(np.flatnonzero(name >= 0), theirs)
+        if not len(placed):
+            return np.zeros((len(ours), len(theirs)))
+        known = self.traits
+        weights = known.area[name[placed]] / known.area[name[placed]].sum()
+        expected, measured = known.distance[np.ix_(ours, name[placed])], found.distance[np.ix_(theirs, placed)]
+        squared = ((expected[:, None] - measured) ** 2 @ weights) / DISTANCE**2
+        return np.asarray(np.sqrt(len(placed)) * squared)
+
+
+def sides(centres: FloatArray, segment: IntArray) -> IntArray:
+    """(r,) 1 for regions on the left, −1 for those on the right of which there is one of the same segment opposite.
+
+    Given (r, 3) centres of regions in units of the square root of the area, the mirror plane being x = 0.
+    """
+    side = np.zeros(len(segment), dtype=np.int64)
+    distances = cdist(centres * (-1, 1, 1), centres)
+    distances[segment[:, None] != segment] = np.inf
+    opposite = distances.argmin(axis=1)
+    paired = (opposite[opposite] == np.arange(len(segment))) & (opposite != np.arange(len(segment)))
+    apart = centres[:, 0] - centres[opposite, 0]
+    paired &= (np.abs(apart) > MIDDLE) & (centres[:, 0] * centres[opposite, 0] < 0)
+    side[paired] = np.sign(apart[paired])
+    return side
+
+
+def side_field(surface: Surface, region: IntArray, side: IntArray) -> FloatArray:
+    """(m,) positive on the left, negative on the right, by what is near; given each face's region and their sides."""
+    inside = _at_vertices(surface, region, len(side))
+    return surface.to_faces(HeatFlow.on(surface.mesh, 1.0).smooth(inside @ side[:, None].astype(np.float64)))[:, 0]
+
+
+def sides_of_parts(
+    surface: Surface, field: FloatArray, polygon_of: IntArray, labels: IntArray, least_share: float
+) -> IntArray:
+    """(p,) side of each polygon: 1 left, −1 right, 0 for those of parts without one of the same label opposite.
+
+    Parameters
+    ----------
+    surface : Surface
+    field : (m,) array
+        What `side_field` gave.
+    polygon_of : (m,) int array
+        The polygon of each face, −1 for none.
+    labels : (p,) int array
+        Of the polygons.
+    least_share : float
+        Parts under this share of the area are on the side of what is next to them.
+    """
+    original = surface.original
+    adjacency = FaceAdjacency.of(surface.welded_faces, original.vertices).between_polygons(polygon_of)
+    part = connected_regions(labels, adjacency)
+    count = int(part.max()) + 1
+    label_of = np.zeros(count, dtype=np.int64)
+    label_of[part] = labels
+    seen = polygon_of >= 0
+    of_faces, weights, values = part[polygon_of[seen]], original.face_areas[seen], field[seen]
+    area = np.bincount(of_faces, weights, count)
+    total = np.maximum(area, np.finfo(float).tiny)
+    mean = np.bincount(of_faces, weights * values, count) / total
+    spread = np.sqrt(np.maximum(np.bincount(of_faces, weights * values**2, count) / total - mean**2, 0))
+    large = area >= least_share * original.area
+    # A part in the middle is left on one half and right on the other, or hardly anything.
+    sided = np.flatnonzero(large & (np.abs(mean) > spread))
+    alike = np.minimum.outer(area[sided], area[sided]) >= ALIKE * np.maximum.outer(area[sided], area[sided])
+    opposite = (label_of[sided][:, None] == label_of[sided]) & (np.outer(mean[sided], mean[sided]) < 0) & alike
+    side = np.zeros(count, dtype=np.int64)
+    side[sided] = np.sign(mean[sided]) * opposite.any(axis=1)
+    centres = original.vertices[original.faces].mean(axis=1)[seen]
+    for label in np.unique(label_of[~large]):
+        ground = np.flatnonzero(large[of_faces] & (label_of[of_faces] == label))
+        crumbs = np.flatnonzero(~large[of_faces] & (label_of[of_faces] == label))
+        if len(ground) and len(crumbs):
+            side[of_faces[crumbs]] = side[of_faces[ground[cKDTree(centres[ground]).query(centres[crumbs])[1]]]]
+    return np.asarray(side[part])
+
+
+def _mean(first: Traits, poses: Sequence[Traits], names: Sequence[IntArray]) -> Traits:
+    """Means over poses of the traits of each of the first one's regions, given the names in each pose."""
+    count = len(first.segment)
+    area, signature, handedness = np.zeros(count), np.zeros((count, FIELDS)), np.zeros((count, PLANES))
+    seen, distance, both = np.zeros(count), np.zeros((count, count)), np.zeros((count, count))
+    for pose, name in zip(poses, names, strict=True):
+        known = np.flatnonzero(name < count)
+        at = name[known]
+        seen[at] += 1
+        area[at] += np.log(pose.area[known])
+        signature[at] += pose.signature[known]
+        handedness[at] += pose.handedness[known]
+        distance[np.ix_(at, at)] += pose.distance[np.ix_(known, known)]
+        both[np.ix_(at, at)] += 1
+    some, times = seen > 0, np.maximum(seen, 1)
+    return Traits(
+        first.segment,
+        np.where(some, np.exp(area / times), first.area),
+        np.where(some[:, None], signature / times[:, None], first.signature),
+        np.where(some[:, None], handedness / times[:, None], first.handedness),
+        np.where(both > 0, distance / np.maximum(both, 1), first.distance),
+    )
+
+
+def _margin(costs: FloatArray) -> float:
+    """By how much the best assignment is better than the next."""
+    if min(costs.shape) == 0:
+        return np.inf
+    rows, columns = linear_sum_assignment(costs)
+    best = costs[rows, columns].sum()
+    others = []
+    for i, j in zip(rows, columns, strict=True):
+        without = costs.copy()
+        without[i, j] = IMPOSSIBLE
+        rows_, columns_ = linear_sum_assignment(without)
+        others.append(without[rows_, columns_].sum())
+    return float(min(others) - best)
+
+
+def _at_vertices(surface: Surface, region: IntArray, count: int) -> FloatArray:
+    """(n', count) share of the area around each vertex of the surface that belongs to each region."""
+    mesh = surface.mesh
+    seen = (surface.face_of >= 0) & (region[surface.face_of] >= 0)
+    areas, faces, owner = mesh.face_areas[seen], mesh.faces[seen], region[surface.face_of[seen]]
+    entries = np.repeat(areas, 3), (faces.ravel(), np.repeat(owner, 3))
+    inside: FloatArray = coo_matrix(entries, shape=(mesh.n_vertices, count)).toarray()
+    return inside / np.maximum(inside.sum(axis=1, keepdims=True), np.finfo(float).tiny)
+
+
+def _signed_areas(mesh: TriangleMesh, fields: FloatArray) -> FloatArray:
+    """(m', PLANES) signed area that each face covers in the plane of each pair of (n', FIELDS) fields."""
+    corners = fields[mesh.faces].astype(np.float64)
+    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    f, g = np.triu_indices(FIELDS, 1)
+    turned = outward(mesh.faces, mesh.vertices[mesh.faces])
+    return np.asarray((u[:, f] * v[:, g] - u[:, g] * v[:, f]) / 2 * turned[:, None])
