@@ -19,20 +19,17 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Sequence
-from itertools import combinations
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from sklearn.metrics import adjusted_rand_score
 
-from benchmarks import characters, makehuman, perturbations, robustness
+from benchmarks import agreement, characters, makehuman, perturbations, robustness
 from benchmarks.speed import table_row
 from wks_segment.core import PoseSegmentation, PoseSignature, TriangleMesh, connect
-from wks_segment.core.mesh import IntArray
+from wks_segment.core.mesh import FloatArray, IntArray
 
 PRESETS = ("default", "paper")
 CLASSES = {"human": 1, "chair": 101, "octopus": 121, "plier": 201, "fish": 221}
@@ -46,6 +43,8 @@ SEEDS = range(5)
 PICTURED = 8
 """Shapes of a class in a picture."""
 Described = dict[str, PoseSignature]
+Frame = dict[str, FloatArray]
+"""How each bone is turned, see `makehuman.motion`."""
 
 
 def main() -> None:
@@ -74,22 +73,14 @@ def consistency(options: argparse.Namespace) -> None:
             f"| **mean of {len(rows)}** | | | | **{np.mean(unseen):.3f}** | {min(row['worst'] for row in rows):.3f} |"
         )
         characters.contact_sheet([output / f"{path.stem}.png" for path in paths], output / "sheet.png")
-    frames, described = _motions(options.data / "makehuman")
-    rows_of = {}
+    described = _motions(options.data / "makehuman")
+    shares = {}
     for preset in PRESETS:
-        model = _model(options, preset).fit([described[name] for name in MOTIONS_LEARNED])
-        faces = np.arange(next(iter(frames.values())).n_faces)
-        known = model.segment_polygons([described[name] for name in MOTIONS_LEARNED], [faces] * len(MOTIONS_LEARNED))
-        labels = {name: known if name in MOTIONS_LEARNED else model.segment_faces(described[name]) for name in frames}
-        rows_of[preset] = [
-            float(np.average(labels[name] == known, weights=frames[name].face_areas))
-            for name in frames
-            if name not in MOTIONS_LEARNED
-        ]
-        _picture([(name, frames[name], labels[name]) for name in frames], options.output / f"makehuman_{preset}.png")
-    print("\n| MakeHuman's own motions, unseen | mean | worst |\n|---|---|---|")
-    for preset, shares in rows_of.items():
-        print(table_row([preset, f"{np.mean(shares):.4f}", f"{min(shares):.3f}"]))
+        found = agreement.with_learned(_model(options, preset), described, MOTIONS_LEARNED)
+        shares[preset] = found.shares
+        pictured = [(name, pose, found.labels.get(name, found.known)) for name, pose in described.items()]
+        _picture(pictured, options.output / f"makehuman_{preset}.png")
+    _print_shares("MakeHuman's own motions, unseen", shares)
 
 
 def human(options: argparse.Namespace) -> None:
@@ -100,31 +91,20 @@ def human(options: argparse.Namespace) -> None:
     for name in CLASSES:
         truth, described = _princeton(options.data / "psb", name)
         shapes = list(described)
-        people = [float(np.mean(_among(t["human_segmentations"]))) for t in truth.values()]
+        people = [agreement.of_people(t["human_segmentations"]) for t in truth.values()]
         parts = [len(np.unique(one)) for t in truth.values() for one in t["human_segmentations"]]
         for preset in PRESETS:
-            model = _model(options, preset).fit([described[shapes[i]] for i in LEARNED])
-            unseen = [shape for i, shape in enumerate(shapes) if i not in LEARNED]
-            regions = {shape: model.segment_regions(described[shape]) for shape in unseen}
-            of_people = [
-                np.mean([rand_index_error(regions[shape], one) for one in truth[shape]["human_segmentations"]])
-                for shape in unseen
-            ]
-            named = [
-                adjusted_rand_score(truth[shape]["part_names"], model.segment_faces(described[shape]))
-                for shape in unseen
-                if "part_names" in truth[shape]
-            ]
-            errors[preset].append(float(np.mean(of_people)))
+            found = agreement.with_people(_model(options, preset), described, [shapes[i] for i in LEARNED], truth)
+            n_regions = [len(np.unique(region)) for region in found.regions.values()]
+            errors[preset].append(float(np.mean(found.errors)))
             print(
                 table_row([
-                    name, preset, f"{np.mean(of_people):.3f}",
-                    f"{np.mean([region.max() + 1 for region in regions.values()]):.1f}", f"{np.mean(people):.3f}",
-                    f"{np.mean(parts):.1f}", f"{np.mean(named):.3f}" if named else "",
+                    name, preset, f"{np.mean(found.errors):.3f}", f"{np.mean(n_regions):.1f}", f"{np.mean(people):.3f}",
+                    f"{np.mean(parts):.1f}", f"{np.mean(found.named):.3f}" if found.named else "",
                 ]),
                 flush=True,
             )  # fmt: skip
-            pictured = [(s, _upright(described[s].surface.original), regions[s]) for s in unseen[:PICTURED]]
+            pictured = [(shape, described[shape], region) for shape, region in found.regions.items()][:PICTURED]
             _picture(pictured, options.output / f"{name}_{preset}.png")
     for preset in PRESETS:
         print(table_row(["**mean**", preset, f"**{np.mean(errors[preset]):.3f}**", "", "", "", ""]))
@@ -136,7 +116,7 @@ def seeds(options: argparse.Namespace) -> None:
     _, humans = _princeton(options.data / "psb", "human")
     shapes = list(humans)
     sets = {"Princeton humans": ([humans[shapes[i]] for i in LEARNED], [humans[s] for s in shapes[1::4]])}
-    _, body = _motions(options.data / "makehuman")
+    body = _motions(options.data / "makehuman")
     sets["MakeHuman"] = [body[n] for n in MOTIONS_LEARNED], [d for n, d in body.items() if n not in MOTIONS_LEARNED]
     for name, (learned, others) in sets.items():
         for preset in PRESETS:
@@ -145,9 +125,8 @@ def seeds(options: argparse.Namespace) -> None:
                 model = _model(options, preset)
                 model.random_state = seed
                 model.fit(learned)
-                labels.append(np.concatenate([model.predict(one) for one in others]))
-            agreement = [adjusted_rand_score(a, b) for a, b in combinations(labels, 2)]
-            print(table_row([name, preset, f"{np.mean(agreement):.3f}", f"{min(agreement):.3f}"]), flush=True)
+                labels.append(_predicted(model, others))
+            print(_pairs_row(name, preset, labels), flush=True)
 
 
 def retrieval(options: argparse.Namespace) -> None:
@@ -190,22 +169,9 @@ def damage(options: argparse.Namespace) -> None:
 
 
 STUDIES: dict[str, Callable[[argparse.Namespace], None]] = {
-    "consistency": consistency, "human": human, "seeds": seeds, "retrieval": retrieval, "remesh": remesh,
-    "robustness": damage,
+    "consistency": consistency, "human": human, "seeds": seeds,
+    "retrieval": retrieval, "remesh": remesh, "robustness": damage,
 }  # fmt: skip
-
-
-def rand_index_error(labels: IntArray, others: Any) -> float:
-    """Share of the pairs of faces that one segmentation puts together and the other apart."""
-    n = len(labels)
-    table = coo_matrix((np.ones(n), (labels, np.unique(others, return_inverse=True)[1].ravel()))).toarray()
-    together = (table.sum(axis=1) ** 2).sum() + (table.sum(axis=0) ** 2).sum()
-    return float((together / 2 - (table**2).sum()) / (n * (n - 1) / 2))
-
-
-def _among(segmentations: Sequence[Any]) -> list[float]:
-    each = [np.unique(one, return_inverse=True)[1].ravel() for one in segmentations]
-    return [rand_index_error(a, b) for a, b in combinations(each, 2)] or [0.0]
 
 
 def _model(options: argparse.Namespace, preset: str) -> PoseSegmentation:
@@ -221,32 +187,56 @@ def _princeton(folder: Path, name: str) -> tuple[dict[str, Any], Described]:
     return truth, dict(zip(truth, found, strict=True))
 
 
-def _motions(folder: Path) -> tuple[dict[str, TriangleMesh], Described]:
-    """MakeHuman's body in frames of its own motions."""
-    body = makehuman.load(folder)
+def _frames(folder: Path) -> dict[str, Frame]:
+    """Some frames of each of MakeHuman's own motions."""
     frames = {}
     for path in sorted(folder.rglob("*.bvh")):
         motion = makehuman.motion(path)
         for i in np.unique(np.linspace(0, len(motion) - 1, FRAMES).astype(int)):
-            frames[f"{path.stem} {i}"] = body.turned(motion[i])
-    connection = connect(*frames.values(), rest=body.posed(0))
-    found = PoseSegmentation().describe_all(list(frames.values()), [connection] * len(frames))
-    return frames, dict(zip(frames, found, strict=True))
+            frames[f"{path.stem} {i}"] = motion[i]
+    return frames
 
 
-def _upright(mesh: TriangleMesh) -> TriangleMesh:
-    """From y upwards to Blender's z upwards."""
-    return TriangleMesh(mesh.vertices[:, [0, 2, 1]] * (1, -1, 1), mesh.faces)
+def _motions(folder: Path) -> Described:
+    """MakeHuman's body in these frames."""
+    return _described(makehuman.load(folder), _frames(folder))
 
 
-def _picture(shapes: Sequence[tuple[str, TriangleMesh, IntArray]], path: Path) -> None:
+def _described(body: makehuman.MakeHuman, frames: Mapping[str, Frame]) -> Described:
+    """A body in some frames, which tell together what is connected."""
+    meshes = [body.turned(frame) for frame in frames.values()]
+    connection = connect(*meshes, rest=body.posed(0))
+    found = PoseSegmentation().describe_all(meshes, [connection] * len(meshes))
+    return dict(zip(frames, found, strict=True))
+
+
+def _predicted(model: PoseSegmentation, described: Iterable[PoseSignature]) -> IntArray:
+    return np.concatenate([model.predict(one) for one in described])
+
+
+def _print_shares(title: str, shares: Mapping[str, Sequence[float]]) -> None:
+    """A table of the settings' shares of area."""
+    print(f"\n| {title} | mean | worst |\n|---|---|---|")
+    for preset, each in shares.items():
+        print(table_row([preset, f"{np.mean(each):.4f}", f"{min(each):.3f}"]))
+
+
+def _pairs_row(what: str, preset: str, labels: Sequence[IntArray]) -> str:
+    """How far models agree on what belongs together."""
+    pairs = agreement.of_pairs(labels)
+    return table_row([what, preset, f"{np.mean(pairs):.3f}", f"{min(pairs):.3f}"])
+
+
+def _picture(shapes: Sequence[tuple[str, PoseSignature, IntArray]], path: Path) -> None:
+    """Shapes in the colours of their faces' labels, from y upwards turned to Blender's z upwards."""
     from wks_segment.blender.picture import Tile, render_poses
     from wks_segment.blender.poses import Pose
 
     tiles = []
-    for name, mesh, labels in shapes:
-        scaled = TriangleMesh(mesh.vertices / np.ptp(mesh.vertices, axis=0).max(), mesh.faces)
-        pose = SimpleNamespace(mesh=scaled, polygon_of=np.arange(mesh.n_faces))
+    for name, shape, labels in shapes:
+        mesh = shape.surface.original
+        upright = mesh.vertices[:, [0, 2, 1]] * (1, -1, 1) / np.ptp(mesh.vertices, axis=0).max()
+        pose = SimpleNamespace(mesh=TriangleMesh(upright, mesh.faces), polygon_of=np.arange(mesh.n_faces))
         tiles.append(Tile(cast(Pose, pose), labels, name))
     render_poses(tiles, path)
     print(f"\npicture: {path}\n", flush=True)
