@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -63,18 +63,29 @@ class MakeHuman:
 
     def turned(self, turns: dict[str, FloatArray], body_only: bool = True) -> TriangleMesh:
         """The mesh with bones turned from rest by (3, 3) matrices in the world's axes; others follow their parents."""
+        vertices = self._moved(turns)[0]
+        faces = self.faces[self.group_of == BODY] if body_only else self.faces
+        used, compact = np.unique(faces, return_inverse=True)
+        return TriangleMesh(vertices[used], compact.reshape(-1, 3))
+
+    def reshaped(self, scales: dict[str, FloatArray]) -> MakeHuman:
+        """Another body in rest: what hangs on a bone scaled by a (3, 3) matrix; others follow their parents."""
+        vertices, places = self._moved(scales)
+        heads = {name: place[:3, :3] @ self.bones[name][1] + place[:3, 3] for name, place in places.items()}
+        bones = {name: (parent, heads[name]) for name, (parent, _) in self.bones.items()}
+        return replace(self, vertices=vertices, bones=bones)
+
+    def _moved(self, matrices: dict[str, FloatArray]) -> tuple[FloatArray, dict[str, FloatArray]]:
+        """Vertices and the (4, 4) placement of each bone, when a (3, 3) matrix acts on a bone about its head."""
         world: dict[str, FloatArray] = {}
         for name, (parent, head) in self.bones.items():
             before = world[parent] if parent else np.eye(4)
             local = np.eye(4)
-            local[:3, :3] = turns.get(name, before[:3, :3])
+            local[:3, :3] = matrices.get(name, before[:3, :3])
             local[:3, 3] = before[:3, :3] @ head + before[:3, 3] - local[:3, :3] @ head
             world[name] = local
         blended = np.einsum("nb,bij->nij", self.weights, np.stack(list(world.values())))
-        vertices = np.einsum("nij,nj->ni", blended[:, :3, :3], self.vertices) + blended[:, :3, 3]
-        faces = self.faces[self.group_of == BODY] if body_only else self.faces
-        used, compact = np.unique(faces, return_inverse=True)
-        return TriangleMesh(vertices[used], compact.reshape(-1, 3))
+        return np.einsum("nij,nj->ni", blended[:, :3, :3], self.vertices) + blended[:, :3, 3], world
 
 
 def load(folder: Path) -> MakeHuman:

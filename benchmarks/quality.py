@@ -3,6 +3,7 @@
 WHAT is one of
 
 consistency  area of unseen poses that has the learned label (characters, and MakeHuman's body in its own motions)
+bodies       the same area on other bodies: MakeHuman's with other bones and other flesh
 human        connected parts against people's (Rand-index error), components against part names (adjusted Rand index)
 seeds        adjusted Rand index between the labels of models that were learned with five seeds
 retrieval    share of shapes whose class has the model under which they are likeliest
@@ -27,6 +28,7 @@ from typing import Any, cast
 import numpy as np
 
 from benchmarks import agreement, characters, makehuman, perturbations, robustness
+from benchmarks.bodies import other_body
 from benchmarks.speed import table_row
 from wks_segment.core import PoseSegmentation, PoseSignature, TriangleMesh, connect
 from wks_segment.core.mesh import FloatArray, IntArray
@@ -39,6 +41,10 @@ LEARNED = (0, 4, 8, 12, 16)
 MOTIONS_LEARNED = ("walk1 0", "walk1 7", "zombieWalk1 12", "benchmark 0", "tpose 0")
 FRAMES = 6
 """Frames of a motion that are taken, first and last among them."""
+OTHER_BODIES = range(1, 7)
+"""Seeds of the other bodies."""
+OTHER_MOTIONS = ("zombieWalk1 24", "walk1 5", "dance1 0")
+"""Frames that the other bodies are seen in, none of them learned. The first is in the picture."""
 SEEDS = range(5)
 PICTURED = 8
 """Shapes of a class in a picture."""
@@ -81,6 +87,24 @@ def consistency(options: argparse.Namespace) -> None:
         pictured = [(name, pose, found.labels.get(name, found.known)) for name, pose in described.items()]
         _picture(pictured, options.output / f"makehuman_{preset}.png")
     _print_shares("MakeHuman's own motions, unseen", shares)
+
+
+def bodies(options: argparse.Namespace) -> None:
+    """Other bodies in unseen frames, with what was learned of MakeHuman's."""
+    folder = options.data / "makehuman"
+    body, frames, described = makehuman.load(folder), _frames(folder), _motions(folder)
+    poses, shown = {name: described[name] for name in MOTIONS_LEARNED}, OTHER_MOTIONS[0]
+    for seed in OTHER_BODIES:
+        found = _described(other_body(body, seed), {name: frames[name] for name in OTHER_MOTIONS})
+        poses |= {f"body {seed}, {name}": pose for name, pose in found.items()}
+    shares = {}
+    for preset in PRESETS:
+        result = agreement.with_learned(_model(options, preset), poses, MOTIONS_LEARNED)
+        shares[preset] = result.shares
+        pictured = [(name, poses[name], labels) for name, labels in result.labels.items() if name.endswith(shown)]
+        pictured.insert(0, (f"learned body, {shown}", described[shown], result.known))
+        _picture(pictured, options.output / f"bodies_{preset}.png")
+    _print_shares(f"{len(OTHER_BODIES)} other bodies in {len(OTHER_MOTIONS)} poses each", shares)
 
 
 def human(options: argparse.Namespace) -> None:
@@ -169,7 +193,7 @@ def damage(options: argparse.Namespace) -> None:
 
 
 STUDIES: dict[str, Callable[[argparse.Namespace], None]] = {
-    "consistency": consistency, "human": human, "seeds": seeds,
+    "consistency": consistency, "bodies": bodies, "human": human, "seeds": seeds,
     "retrieval": retrieval, "remesh": remesh, "robustness": damage,
 }  # fmt: skip
 
