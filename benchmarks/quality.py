@@ -4,6 +4,7 @@ WHAT is one of
 
 consistency  area of unseen poses that has the learned label (characters, and MakeHuman's body in its own motions)
 bodies       the same area on other bodies: MakeHuman's with other bones and other flesh
+choices      consistency and human, of MakeHuman's body and the Princeton humans, with other poses learned
 human        connected parts against people's (Rand-index error), components against part names (adjusted Rand index)
 seeds        adjusted Rand index between the labels of models that were learned with five seeds
 retrieval    share of shapes whose class has the model under which they are likeliest
@@ -45,6 +46,8 @@ OTHER_BODIES = range(1, 7)
 """Seeds of the other bodies."""
 OTHER_MOTIONS = ("zombieWalk1 24", "walk1 5", "dance1 0")
 """Frames that the other bodies are seen in, none of them learned. The first is in the picture."""
+CHOICES = range(5)
+"""Seeds of what is learned; 0 stands for `LEARNED` and `MOTIONS_LEARNED`."""
 SEEDS = range(5)
 PICTURED = 8
 """Shapes of a class in a picture."""
@@ -105,6 +108,34 @@ def bodies(options: argparse.Namespace) -> None:
         pictured.insert(0, (f"learned body, {shown}", described[shown], result.known))
         _picture(pictured, options.output / f"bodies_{preset}.png")
     _print_shares(f"{len(OTHER_BODIES)} other bodies in {len(OTHER_MOTIONS)} poses each", shares)
+
+
+def choices(options: argparse.Namespace) -> None:
+    """How much depends on which poses or shapes are learned."""
+    body = _motions(options.data / "makehuman")
+    truth, humans = _princeton(options.data / "psb", "human")
+    of_body = _choices(list(body), MOTIONS_LEARNED)
+    of_humans = _choices(list(humans), [list(humans)[i] for i in LEARNED])
+    print(f"| {len(CHOICES)} choices | setting | each | mean | spread | worst pose |\n|{'---|' * 6}")
+    pairs = []
+    for preset in PRESETS:
+        model = _model(options, preset)
+        shares, errors, named = [], [], []
+        labels: dict[str, list[IntArray]] = {"MakeHuman": [], "Princeton humans": []}
+        for names in of_body:
+            shares.append(agreement.with_learned(model, body, names).shares)
+            labels["MakeHuman"].append(_predicted(model, body.values()))
+        for names in of_humans:
+            found = agreement.with_people(model, humans, names, truth)
+            errors.append(found.errors)
+            named.append(found.named)
+            labels["Princeton humans"].append(_predicted(model, humans.values()))
+        print(_choices_row("MakeHuman: area with the learned label", preset, shares, min))
+        print(_choices_row("humans: Rand-index error", preset, errors, max))
+        print(_choices_row("humans: part names", preset, named, min), flush=True)
+        pairs += [_pairs_row(name, preset, each) for name, each in labels.items()]
+    print("\n| same parts from all choices | setting | mean of all pairs | lowest |\n|---|---|---|---|")
+    print("\n".join(pairs))
 
 
 def human(options: argparse.Namespace) -> None:
@@ -193,7 +224,7 @@ def damage(options: argparse.Namespace) -> None:
 
 
 STUDIES: dict[str, Callable[[argparse.Namespace], None]] = {
-    "consistency": consistency, "bodies": bodies, "human": human, "seeds": seeds,
+    "consistency": consistency, "bodies": bodies, "choices": choices, "human": human, "seeds": seeds,
     "retrieval": retrieval, "remesh": remesh, "robustness": damage,
 }  # fmt: skip
 
@@ -234,6 +265,12 @@ def _described(body: makehuman.MakeHuman, frames: Mapping[str, Frame]) -> Descri
     return dict(zip(frames, found, strict=True))
 
 
+def _choices(names: Sequence[str], first: Sequence[str]) -> list[Sequence[str]]:
+    """The first choice of some names, as given, and as many names drawn from all for each further seed."""
+    drawn = (np.random.default_rng(seed).permutation(len(names))[: len(first)] for seed in CHOICES[1:])
+    return [first, *([names[i] for i in sorted(chosen)] for chosen in drawn)]
+
+
 def _predicted(model: PoseSegmentation, described: Iterable[PoseSignature]) -> IntArray:
     return np.concatenate([model.predict(one) for one in described])
 
@@ -243,6 +280,15 @@ def _print_shares(title: str, shares: Mapping[str, Sequence[float]]) -> None:
     print(f"\n| {title} | mean | worst |\n|---|---|---|")
     for preset, each in shares.items():
         print(table_row([preset, f"{np.mean(each):.4f}", f"{min(each):.3f}"]))
+
+
+def _choices_row(what: str, preset: str, of_choices: Sequence[Sequence[float]], worst: Callable[[Any], float]) -> str:
+    """A measure's mean for each choice, their mean and standard deviation, and its worst value."""
+    each = [float(np.mean(one)) for one in of_choices]
+    return table_row([
+        what, preset, " ".join(f"{mean:.3f}" for mean in each), f"{np.mean(each):.3f}", f"{np.std(each, ddof=1):.3f}",
+        f"{worst(map(worst, of_choices)):.3f}",
+    ])  # fmt: skip
 
 
 def _pairs_row(what: str, preset: str, labels: Sequence[IntArray]) -> str:
