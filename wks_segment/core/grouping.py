@@ -190,9 +190,12 @@ class Grouping:
         return 2 + int(np.flatnonzero(curve >= curve.max() - BEST_WITHIN)[-1])
 
     def number_of_wholes(self, most: int) -> int:
-        """The most groups, up to `most`, that are no mere pieces: their borders are short for their areas."""
-        whole = np.flatnonzero(self.cuts[:most] <= MOST_CUT)
-        return max(int(whole[-1]) + 1, min(most, 2))
+        """The most groups, up to `most`, that are no mere pieces: their borders are short for their areas.
+
+        Fewer groups than these are whole, too.
+        """
+        pieces = np.flatnonzero(self.cuts[:most] > MOST_CUT)
+        return max(int(pieces[0]) if len(pieces) else most, min(most, 2))
 
 
 def _gains_of_joining(borders: FloatArray, areas: FloatArray) -> FloatArray:

@@ -74,7 +74,12 @@ def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], Covariance
         r = _length(content, "region_segment", MOST_REGIONS)
         grouped = {"joins": (k - 1, 2), "certainties": (k,), "by_chance": (k,), "cuts": (k,)}
         grouped |= {"region_segment": (r,), "region_side": (r,), "region_area": (r,), "region_distance": (r, r)}
-        grouped |= {"region_signature": (r, FIELDS), "region_handedness": (r, PLANES), "region_groups": ()}
+        grouped |= {
+            "region_signature": (r, FIELDS),
+            "region_handedness": (r, PLANES),
+            "region_groups": (),
+            "region_noise": (4,),
+        }
     shapes = {"shared": (d,), "diag": (k, d), "spherical": (k,), "tied": (d, d), "full": (k, d, d)}
     if covariance_type not in get_args(CovarianceType):
         raise ModelFileError(f"the model is damaged: unknown covariance type {covariance_type!r}")
@@ -138,8 +143,10 @@ def _check_regions(arrays: dict[str, FloatArray], n_components: int) -> None:
         raise ModelFileError(f"the model is damaged: region_groups is {groups:g}, not a number of groups")
     if not (len(segment) and (segment % 1 == 0).all() and (segment >= 0).all() and (segment < groups).all()):
         raise ModelFileError(f"the model is damaged: region_segment has a number that is none of {groups:g} groups")
-    if not np.isin(arrays["region_side"], (-1, 0, 1)).all() or not (arrays["region_area"] > 0).all():
-        raise ModelFileError("the model is damaged: region_side is not -1, 0 or 1, or region_area not positive")
+    if not np.isin(arrays["region_side"], (-1, 0, 1)).all():
+        raise ModelFileError("the model is damaged: region_side has a number that is not -1, 0 or 1")
+    if not ((arrays["region_area"] > 0).all() and (arrays["region_noise"] > 0).all()):
+        raise ModelFileError("the model is damaged: region_area or region_noise is not positive")
 
 
 def write(path: str | PathLike[str], text: str) -> None:

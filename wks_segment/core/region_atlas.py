@@ -31,8 +31,11 @@ FIELDS = 6
 PLANES = FIELDS * (FIELDS - 1) // 2
 REACH = 0.3
 """How far a region's surroundings reach, in units of the square root of the area."""
-SIGNATURE, DISTANCE = 2.0, 0.1
-"""Weight of a difference of mean signature, and difference of distance that counts 1, beside that of log area."""
+NOISE = {"area": 0.5, "signature": 0.5, "handedness": 0.5, "distance": 0.1}
+"""How much traits change from pose to pose, if there is one pose only: of the logarithm of the area, of the signature,
+of handedness in units of its root mean square, of distances …"""
+LEAST_NOISE = {"area": 0.1, "signature": 0.1, "handedness": 0.2, "distance": 0.03}
+"""… and at least, however alike the learned poses are."""
 LEAST_OVERLAP = 1e-6
 """Regions whose heat overlaps less than this are as far apart as that."""
 IMPOSSIBLE = 1e6
@@ -163,26 +166,39 @@ class RegionAtlas:
         Means over the learned poses.
     side : (r,) int array
         1: left, which is +x as in Blender; −1: right; 0: neither.
+    noise : (4,) array
+        How much log area, signature, handedness and distance change from pose to pose: standard deviations.
     """
 
     n_groups: int
     traits: Traits
     side: IntArray
+    noise: FloatArray
 
     @classmethod
     def learned(cls, n_groups: int, poses: Sequence[Traits], centres: FloatArray) -> RegionAtlas:
         """From one or several poses, and the (r, 3) centres of the first one's regions, best at rest."""
-        atlas = cls(n_groups, poses[0], sides(centres, poses[0].segment))
+        side = sides(centres, poses[0].segment)
+        atlas = cls(n_groups, poses[0], side, _scaled(NOISE, poses[0]))
         # A mean over poses finds regions of each more surely than the first pose does.
         for _ in range(2):
             names = [atlas.named(pose) for pose in poses]
-            atlas = cls(n_groups, _mean(atlas.traits, poses, names), atlas.side)
+            mean = _mean(atlas.traits, poses, names)
+            noise = _scaled(NOISE, mean)
+            if len(poses) > 1:
+                noise = np.maximum(_spread(mean, poses, names), _scaled(LEAST_NOISE, mean))
+            atlas = cls(n_groups, mean, side, noise)
         return atlas
 
     def arrays(self) -> dict[str, FloatArray | IntArray]:
         """What a file keeps; see `of_arrays`."""
         of_traits = {f"region_{name}": getattr(self.traits, name) for name in Traits.__dataclass_fields__}
-        return {"region_groups": np.array(self.n_groups), "region_side": self.side, **of_traits}
+        return {
+            "region_groups": np.array(self.n_groups),
+            "region_side": self.side,
+            "region_noise": self.noise,
+            **of_traits,
+        }
 
     @classmethod
     def of_arrays(cls, arrays: Mapping[str, FloatArray]) -> RegionAtlas:
@@ -192,7 +208,7 @@ class RegionAtlas:
             arrays[f"region_{name}"] for name in ("area", "signature", "handedness", "distance")
         )
         traits = Traits(segment, area, signature, handedness, distance)
-        return cls(int(arrays["region_groups"]), traits, side)
+        return cls(int(arrays["region_groups"]), traits, side, arrays["region_noise"])
 
     def named(self, found: Traits) -> IntArray:
         """(r',) the atlas' region that each found one is; those that are none are numbered on from there.
@@ -232,12 +248,12 @@ class RegionAtlas:
 
     def _differences(self, found: Traits) -> FloatArray:
         """(r, r') how unlike each known and each found region are, by themselves."""
+        area, signature, handedness, _ = self.noise
         known = self.traits
-        scale = np.sqrt(np.mean(np.sum(known.handedness**2, axis=1))) or 1.0
-        areas = np.subtract.outer(np.log(known.area), np.log(found.area)) ** 2
-        signatures = cdist(known.signature, found.signature, "sqeuclidean") * SIGNATURE**2 / FIELDS
-        hands = cdist(known.handedness, found.handedness, "sqeuclidean") / scale**2
-        return np.asarray(areas + signatures + hands)
+        areas = np.subtract.outer(np.log(known.area), np.log(found.area)) / area
+        signatures = cdist(known.signature / signature, found.signature / signature)
+        hands = cdist(known.handedness / handedness, found.handedness / handedness)
+        return np.asarray(areas**2 + signatures**2 + hands**2)
 
     def _displacements(self, found: Traits, name: IntArray, ours: IntArray, theirs: IntArray) -> FloatArray:
         """(len(ours), len(theirs)) by how much distances to regions with a name differ, those of `theirs` apart."""
@@ -247,7 +263,8 @@ class RegionAtlas:
         known = self.traits
         weights = known.area[name[placed]] / known.area[name[placed]].sum()
         expected, measured = known.distance[np.ix_(ours, name[placed])], found.distance[np.ix_(theirs, placed)]
-        squared = ((expected[:, None] - measured) ** 2 @ weights) / DISTANCE**2
+        squared = ((expected[:, None] - measured) / self.noise[3]) ** 2 @ weights
+        # Distances to several regions say more than one, but not as much as if each were told for itself.
         return np.asarray(np.sqrt(len(placed)) * squared)
 
 
@@ -340,6 +357,32 @@ def _mean(first: Traits, poses: Sequence[Traits], names: Sequence[IntArray]) -> 
         np.where(some[:, None], handedness / times[:, None], first.handedness),
         np.where(both > 0, distance / np.maximum(both, 1), first.distance),
     )
+
+
+def _spread(mean: Traits, poses: Sequence[Traits], names: Sequence[IntArray]) -> FloatArray:
+    """(4,) standard deviation from the mean, over regions and poses, of log area, signature, handedness, distance."""
+    squares, count = np.zeros(4), len(mean.segment)
+    seen = np.zeros(2)
+    for pose, name in zip(poses, names, strict=True):
+        known = np.flatnonzero(name < count)
+        at = name[known]
+        both = np.ix_(known, known), np.ix_(at, at)
+        squares += (
+            np.sum((np.log(pose.area[known]) - np.log(mean.area[at])) ** 2),
+            np.sum((pose.signature[known] - mean.signature[at]) ** 2) / FIELDS,
+            np.sum((pose.handedness[known] - mean.handedness[at]) ** 2) / PLANES,
+            np.sum((pose.distance[both[0]] - mean.distance[both[1]]) ** 2),
+        )
+        seen += len(known), len(known) ** 2
+    # The mean is of the same poses.
+    lost = len(poses) / (len(poses) - 1)
+    return np.asarray(np.sqrt(lost * squares / np.maximum(seen[[0, 0, 0, 1]], 1)))
+
+
+def _scaled(noise: Mapping[str, float], traits: Traits) -> FloatArray:
+    """(4,) with that of handedness in units of its root mean square."""
+    hands = float(np.sqrt(np.mean(traits.handedness**2))) or 1.0
+    return np.array([noise["area"], noise["signature"], noise["handedness"] * hands, noise["distance"]])
 
 
 def _margin(costs: FloatArray) -> float:
