@@ -19,13 +19,14 @@ from .shape import COARSE, curvature_across, smooth_normals, vertex_normals
 from .surface import Surface
 
 CREASE, MOST_CONCAVE, MOST_CONVEX = 0.05, 15.0, 0.0
-"""Weight of a border by e to this times its curvature, which is taken between these bounds.
-
-Creases come and go with the pose: at 0.4, which agrees best with people, labels are less the same in all poses."""
+"""Weight of a border by e to this times its curvature, which is taken between these bounds. Creases come and go with
+the pose: at 0.4, which agrees best with people, segments are less the same in all poses …"""
 STRENGTH = 2.0
 """What a border costs by its length, in units of the smoothing length. Less leaves borders where noise puts them."""
 WIDTH = 1.0
 """How far a label may spread from the faces that have it, in units of the smoothing length."""
+REGION_CREASE, REGION_WIDTH = 0.4, 2.0
+"""… but regions, which are fewer, are not."""
 LEAST_POSTERIOR = 1e-3
 """A posterior counts as no less than this: what is certain is no more certain than that."""
 LARGEST = 2.0**29
@@ -38,14 +39,14 @@ SWEEPS = 5
 """Rounds over all labels at most. Two or three are usual."""
 
 
-def crease_weights(surface: Surface, adjacency: FaceAdjacency) -> FloatArray:
+def crease_weights(surface: Surface, adjacency: FaceAdjacency, crease: float = CREASE) -> FloatArray:
     """(p,) weight of the border between neighbours among the original faces: 1 where flat or convex, less in creases.
 
     For `cut_borders`; where marked edges are to attract borders, to be multiplied by a number below 1 there.
     """
     normals = smooth_normals(surface, vertex_normals(surface), COARSE)
     curvature = curvature_across(surface, normals, adjacency)
-    return np.asarray(np.exp(CREASE * np.clip(curvature, -MOST_CONCAVE, MOST_CONVEX)))
+    return np.asarray(np.exp(crease * np.clip(curvature, -MOST_CONCAVE, MOST_CONVEX)))
 
 
 def cut_borders(

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_matrix, diags
 from threadpoolctl import threadpool_limits
 
-from .cut import crease_weights, cut_borders
+from .cut import CREASE, WIDTH, crease_weights, cut_borders
 from .mesh import BoolArray, FloatArray, IntArray
 from .regions import FaceAdjacency, merge_crumbs
 from .smoothing import HeatFlow
@@ -28,6 +28,8 @@ def clean_labels(
     least_share: float,
     progress: Callable[[float], None] | None = None,
     marked: IntArray | None = None,
+    crease: float = CREASE,
+    width: float = WIDTH,
 ) -> tuple[IntArray, FaceAdjacency]:
     """Label the polygons of a mesh from the mean posterior of all poses.
 
@@ -47,6 +49,8 @@ def clean_labels(
         Called after each pose with the share that is done, 0 to 1.
     marked : (q, 2) int array, optional
         Neighbouring polygons between which a border is welcome.
+    crease, width : float
+        How much creases draw borders, and over how many smoothing lengths; see `crease_weights`, `cut_borders`.
 
     Returns
     -------
@@ -73,7 +77,7 @@ def clean_labels(
         posteriors = posteriors + mean @ surface.to_faces(of_vertices)
         areas += total * seen
         poses_seen += seen
-        layouts.append(_Layout.of(surface, polygon_of, mean, length > 0))
+        layouts.append(_Layout.of(surface, polygon_of, mean, crease if length > 0 else None))
         if progress:
             progress((i + 1) / len(surfaces))
     # Of one mesh the borders are the same in every pose; modifiers may hide some of them in one.
@@ -88,7 +92,7 @@ def clean_labels(
         weights = layout.weights
         if marked is not None:
             weights = np.where(adjacency.among(marked), MARKED * weights, weights)
-        labels = cut_borders(posteriors, areas, centres, adjacency, weights, length, labels)
+        labels = cut_borders(posteriors, areas, centres, adjacency, weights, length, labels, width=width)
     return merge_crumbs(labels, areas, centres, adjacency, least_share)
 
 
@@ -114,13 +118,16 @@ class _Layout:
     weights: FloatArray
 
     @classmethod
-    def of(cls, surface: Surface, polygon_of: IntArray, mean: csr_matrix, weighed: bool) -> _Layout:
-        """Given the polygon of each triangle and the (p, m) mean of triangles over each polygon."""
+    def of(cls, surface: Surface, polygon_of: IntArray, mean: csr_matrix, crease: float | None) -> _Layout:
+        """Given the polygon of each triangle and the (p, m) mean of triangles over each polygon.
+
+        Without `crease` every border counts the same.
+        """
         original = surface.original
         unit = np.sqrt(original.area)
         adjacency = FaceAdjacency.of(surface.welded_faces, original.vertices / unit)
         across = adjacency.across(polygon_of)
-        weights = crease_weights(surface, adjacency) if weighed else np.ones(len(adjacency.lengths))
+        weights = np.ones(len(across)) if crease is None else crease_weights(surface, adjacency, crease)
         centres = np.asarray(mean @ (original.vertices[original.faces].mean(axis=1) / unit))
         seen = np.asarray(mean.sum(axis=1)).ravel() > 0
         return cls(seen, centres, adjacency.between_polygons(polygon_of), weights[across])

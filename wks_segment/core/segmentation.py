@@ -14,6 +14,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from . import model_file
+from .cut import REGION_CREASE, REGION_WIDTH
 from .description import PoseDescriber, PoseSignature, Progress
 from .grouping import Grouping
 from .intrinsic import Laplacian
@@ -484,7 +485,8 @@ class PoseSegmentation(PoseDescriber):
         marked: IntArray | None = None,
         n_groups: int | None = None,
     ) -> tuple[IntArray, FaceAdjacency]:
-        """Labels of polygons (None: each triangle is one), and neighbours; see `clean_labels`."""
+        """Segments, or with `n_groups` what regions are parts of; of polygons (None: triangles). See `clean_labels`."""
+        creases = {} if n_groups is None else {"crease": REGION_CREASE, "width": REGION_WIDTH}
         return clean_labels(
             [pose.surface for pose in poses],
             lambda i: self._posteriors(poses[i], n_groups),
@@ -493,6 +495,7 @@ class PoseSegmentation(PoseDescriber):
             self._least_share(min_share),
             progress,
             marked,
+            **creases,
         )
 
     def _fields(self, pose: PoseSignature) -> FloatArray:
