@@ -49,8 +49,6 @@ OTHER_MOTIONS = ("zombieWalk1 24", "walk1 5", "dance1 0")
 CHOICES = range(5)
 """Seeds of what is learned; 0 stands for `LEARNED` and `MOTIONS_LEARNED`."""
 SEEDS = range(5)
-PICTURED = 8
-"""Shapes of a class in a picture."""
 Described = dict[str, PoseSignature]
 Frame = dict[str, FloatArray]
 """How each bone is turned, see `makehuman.motion`."""
@@ -149,7 +147,8 @@ def human(options: argparse.Namespace) -> None:
         people = [agreement.of_people(t["human_segmentations"]) for t in truth.values()]
         parts = [len(np.unique(one)) for t in truth.values() for one in t["human_segmentations"]]
         for preset in PRESETS:
-            found = agreement.with_people(_model(options, preset), described, [shapes[i] for i in LEARNED], truth)
+            model, learned = _model(options, preset), [shapes[i] for i in LEARNED]
+            found = agreement.with_people(model, described, learned, truth)
             n_regions = [len(np.unique(region)) for region in found.regions.values()]
             errors[preset].append(float(np.mean(found.errors)))
             print(
@@ -159,7 +158,8 @@ def human(options: argparse.Namespace) -> None:
                 ]),
                 flush=True,
             )  # fmt: skip
-            pictured = [(shape, described[shape], region) for shape, region in found.regions.items()][:PICTURED]
+            regions = found.regions | {shape: model.segment_regions(described[shape]) for shape in learned}
+            pictured = [(shape, described[shape], regions[shape]) for shape in shapes]
             _picture(pictured, options.output / f"{name}_{preset}.png")
     for preset in PRESETS:
         print(table_row(["**mean**", preset, f"**{np.mean(errors[preset]):.3f}**", "", "", "", ""]))
