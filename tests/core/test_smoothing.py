@@ -11,7 +11,7 @@ def test_smoothing_keeps_sums_and_does_not_depend_on_the_meshing():
     for n in (30, 60):
         mesh = grid(n, n)
         hard = (mesh.vertices[:, 0] > 0.5).astype(float)
-        smooth = HeatFlow.on(mesh, 0.1).smooth(np.stack([hard, 1 - hard], axis=1))
+        smooth = HeatFlow(mesh, 0.1).smooth(np.stack([hard, 1 - hard], axis=1))
         np.testing.assert_allclose(smooth.sum(axis=1), 1.0, atol=1e-5)
         results.append(np.interp(np.linspace(0, 1, 11), mesh.vertices[:: n + 1, 0], smooth[:: n + 1, 0]))
     np.testing.assert_allclose(results[0], results[1], atol=0.06)
@@ -25,7 +25,7 @@ def test_smoothing_of_needles_that_single_precision_cannot_hold():
         vertices[c] = (vertices[a] + vertices[b]) / 2 + 1e-7 * random.standard_normal(3)
     mesh = prepare_surface(TriangleMesh(vertices, faces), 450).mesh
     posteriors = random.dirichlet(np.ones(3), mesh.n_vertices)
-    smooth = HeatFlow.on(mesh, 0.06).smooth(posteriors)
+    smooth = HeatFlow(mesh, 0.06).smooth(posteriors)
     np.testing.assert_allclose(smooth.sum(axis=1), 1, atol=1e-6)
     system = np.diag(unit_area_masses(mesh)) + 0.06**2 * stiffness_matrix(mesh).toarray()
     np.testing.assert_allclose(system @ smooth, unit_area_masses(mesh)[:, None] * posteriors, atol=1e-9)

@@ -73,7 +73,7 @@ def clean_labels(
         mean = diags(1 / np.where(seen, total, 1)) @ sum_over @ diags(weight)
         of_vertices = posteriors_on(i)
         if length > 0:
-            of_vertices = HeatFlow.on(surface.mesh, length).smooth(of_vertices)
+            of_vertices = HeatFlow(surface.mesh, length).smooth(of_vertices)
         posteriors = posteriors + mean @ surface.to_faces(of_vertices)
         areas += total * seen
         poses_seen += seen

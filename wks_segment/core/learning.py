@@ -10,9 +10,9 @@ from threadpoolctl import threadpool_limits
 
 from .description import PoseSignature
 from .grouping import Contacts, Ground, Grouping
-from .mesh import BoolArray, FloatArray
+from .mesh import FloatArray, IntArray
 from .mixture import CovarianceType, GaussianMixture, TooFewSamplesError, drawn_evenly, fit_mixtures
-from .regions import FaceAdjacency, connected_regions
+from .regions import connected_regions
 from .smoothing import HeatFlow
 
 AUTO: tuple[CovarianceType, ...] = ("shared", "diag")
@@ -60,18 +60,22 @@ class Candidates:
         On poses of one mesh that is the one whose labels agree best between the poses.
         """
         contacts: list[list[Contacts]] = [[] for _ in self.mixtures]
+        likeliest: list[list[IntArray]] = [[] for _ in self.mixtures]
+        grounds = []
         samples: list[list[FloatArray]] = [[] for _ in self.mixtures]
         first = self.poses[0].surface.original
         drawn = drawn_evenly(first.face_areas / first.area, COMPARED) if of_one_mesh(self.poses) else None
         for i, pose in enumerate(self.poses):
             tick(i / len(self.poses))
             ground, standardised = Ground.of(pose.surface), self.standardised(pose.signature)
-            flow = HeatFlow.on(pose.surface.mesh, SMOOTHING_LENGTH)
-            for mixture, found, kept in zip(self.mixtures, contacts, samples, strict=True):
+            grounds.append(ground)
+            flow = HeatFlow(pose.surface.mesh, SMOOTHING_LENGTH)
+            for j, mixture in enumerate(self.mixtures):
                 of_faces = pose.surface.to_faces(flow.smooth(mixture.posteriors(standardised)))
-                found.append(Contacts.on(ground, of_faces))
+                contacts[j].append(Contacts.on(ground, of_faces))
+                likeliest[j].append(of_faces.argmax(axis=1))
                 if drawn is not None:
-                    kept.append(of_faces[drawn])
+                    samples[j].append(of_faces[drawn])
         means = [Contacts.mean(found) for found in contacts]
         if drawn is not None:
             means = [mean.with_changes(np.stack(kept)) for mean, kept in zip(means, samples, strict=True)]
@@ -87,7 +91,7 @@ class Candidates:
             for score, mixture in zip(scores, self.mixtures, strict=True)
         ]
         best = int(np.argmin(losses))
-        return self.mixtures[best], self._without_scattered(self.mixtures[best], means[best], groupings[best])
+        return self.mixtures[best], self._without_scattered(means[best], groupings[best], grounds, likeliest[best])
 
     def _agreement(self, grouping: Grouping, posteriors: list[FloatArray]) -> float:
         """Share of faces and pairs of poses that have the same label, given posteriors of some faces in each pose."""
@@ -95,30 +99,28 @@ class Candidates:
         labels = np.stack([(each @ np.eye(number)[grouping.groups(number)]).argmax(axis=1) for each in posteriors])
         return float((labels[:, None] == labels).mean())
 
-    def _without_scattered(self, mixture: GaussianMixture, contacts: Contacts, grouping: Grouping) -> Grouping:
-        """Joined anew until no segment is crumbs everywhere: first what is, to what it lies on."""
-        scattered = np.zeros(len(mixture.weights), dtype=bool)
+    def _without_scattered(
+        self, contacts: Contacts, grouping: Grouping, grounds: Sequence[Ground], components: Sequence[IntArray]
+    ) -> Grouping:
+        """Joined anew until no segment is crumbs everywhere: first what is, to what it lies on.
+
+        Given the likeliest component of each face in each pose.
+        """
+        scattered = np.zeros(len(contacts.areas), dtype=bool)
         for _ in range(REGROUPED):
-            lasting = self._lasting(mixture, grouping)
+            number = self.number(grouping)
+            group, seen = grouping.groups(number), np.zeros(number)
+            for ground, of_faces in zip(grounds, components, strict=True):
+                labels, original = group[of_faces], ground.surface.original
+                region = connected_regions(labels, ground.adjacency)
+                large = np.bincount(region, original.face_areas) >= MIN_SHARE * original.area
+                seen[np.unique(labels[large[region]])] += 1
+            lasting = seen >= len(grounds) / 2
             if lasting.all():
                 break
-            scattered |= ~lasting[grouping.groups(len(lasting))]
+            scattered |= ~lasting[group]
             grouping = Grouping.of(contacts, scattered)
         return grouping
-
-    def _lasting(self, mixture: GaussianMixture, grouping: Grouping) -> BoolArray:
-        """(n_segments,) whether a segment has a part in most poses that is no crumb."""
-        number = self.number(grouping)
-        seen, group = np.zeros(number), np.eye(number)[grouping.groups(number)]
-        for pose in self.poses:
-            surface, original = pose.surface, pose.surface.original
-            posteriors = mixture.posteriors(self.standardised(pose.signature)) @ group
-            smooth = HeatFlow.on(surface.mesh, SMOOTHING_LENGTH).smooth(posteriors)
-            labels = surface.to_faces(smooth).argmax(axis=1)
-            region = connected_regions(labels, FaceAdjacency.of(surface.welded_faces, original.vertices))
-            large = np.bincount(region, original.face_areas) >= MIN_SHARE * original.area
-            seen[np.unique(labels[large[region]])] += 1
-        return np.asarray(seen >= len(self.poses) / 2)
 
 
 def fine_mixtures(

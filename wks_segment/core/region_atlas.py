@@ -140,7 +140,7 @@ class Traits:
         area = np.bincount(region[region >= 0], original.face_areas[region >= 0], count) / original.area
         masses = unit_area_masses(mesh)
         inside = _at_vertices(surface, region, count)
-        heat = HeatFlow.on(mesh, REACH).smooth(inside).astype(np.float64)
+        heat = HeatFlow(mesh, REACH).smooth(inside).astype(np.float64)
         weighed = inside * masses[:, None]
         signature = weighed.T @ fields / np.maximum(weighed.sum(axis=0), LEAST_OVERLAP)[:, None]
         against = np.where(segment[:, None] == segment, -1.0, 0.0)
@@ -287,7 +287,7 @@ def sides(centres: FloatArray, segment: IntArray) -> IntArray:
 def side_field(surface: Surface, region: IntArray, side: IntArray) -> FloatArray:
     """(m,) positive on the left, negative on the right, by what is near; given each face's region and their sides."""
     inside = _at_vertices(surface, region, len(side))
-    return surface.to_faces(HeatFlow.on(surface.mesh, 1.0).smooth(inside @ side[:, None].astype(np.float64)))[:, 0]
+    return surface.to_faces(HeatFlow(surface.mesh, 1.0).smooth(inside @ side[:, None].astype(np.float64)))[:, 0]
 
 
 def sides_of_parts(

@@ -215,7 +215,7 @@ class PoseSegmentation(PoseDescriber):
         pose = self._described(mesh)
         posteriors, smoothness = self._posteriors(pose), self._setting("smoothness")
         if smoothness > 0:
-            smooth = HeatFlow.on(pose.surface.mesh, smoothness * SMOOTHING_LENGTH).smooth(posteriors)
+            smooth = HeatFlow(pose.surface.mesh, smoothness * SMOOTHING_LENGTH).smooth(posteriors)
             # Obtuse triangles let the heat flow a little beyond 0 and 1.
             posteriors = np.clip(smooth, 0, 1).astype(np.float64)
             posteriors /= posteriors.sum(axis=1, keepdims=True)

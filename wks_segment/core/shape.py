@@ -78,7 +78,7 @@ def vertex_normals(surface: Surface) -> FloatArray:
 
 def smooth_normals(surface: Surface, normals: FloatArray, length: float) -> FloatArray:
     """(n', 3) unit normals, averaged over about `length`."""
-    return _unit(HeatFlow.on(surface.mesh, length).smooth(normals).astype(np.float64))
+    return _unit(HeatFlow(surface.mesh, length).smooth(normals).astype(np.float64))
 
 
 def curvature_across(surface: Surface, normals: FloatArray, adjacency: FaceAdjacency) -> FloatArray:
@@ -120,15 +120,16 @@ def log_thickness(surface: Surface, normals: FloatArray) -> FloatArray:
     if step > 1:
         radius = radius[tree.query(places)[1]]
     logs = np.log(radius + FLAT)[:, None]
-    return HeatFlow.on(mesh, THICKNESS_LENGTH).smooth(logs)[:, 0].astype(np.float64)
+    return HeatFlow(mesh, THICKNESS_LENGTH).smooth(logs)[:, 0].astype(np.float64)
 
 
 def border_weights(surface: Surface, adjacency: FaceAdjacency) -> FloatArray:
     """(p,) weight of the border between neighbours: 1 where nothing speaks for a cut, less where people cut."""
     original = surface.original
     normals = vertex_normals(surface)
-    thickness = surface.to_faces(log_thickness(surface, smooth_normals(surface, normals, FINE))[:, None])[:, 0]
-    curvature = curvature_across(surface, smooth_normals(surface, normals, COARSE), adjacency)
+    fine, coarse = (smooth_normals(surface, normals, length) for length in (FINE, COARSE))
+    thickness = surface.to_faces(log_thickness(surface, fine)[:, None])[:, 0]
+    curvature = curvature_across(surface, coarse, adjacency)
     centres = original.vertices[original.faces].mean(axis=1) / np.sqrt(original.area)
     a, b = adjacency.pairs.T
     distances = np.maximum(np.linalg.norm(centres[a] - centres[b], axis=1), SHORTEST)

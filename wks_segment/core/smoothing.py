@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -25,38 +24,41 @@ class _Factor(Protocol):
     def solve(self, right: FloatArray) -> FloatArray: ...
 
 
-@dataclass(frozen=True)
 class HeatFlow:
-    """One implicit step of heat flow, (M + t S) u' = M u with t = length², factored once for any number of functions.
+    """One implicit step of heat flow, (M + t S) u' = M u with t = length².
 
-    On a large surface it is taken on cells a fraction of the length wide.
+    Factored once, for any number of functions; on a large surface on cells a fraction of the length wide.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+    length : float
+        Over about which values are averaged, in units of the square root of the area.
     """
 
-    mass: csr_matrix
-    factor: _Factor
-    prolongation: csr_matrix | None
-
-    @classmethod
-    def on(cls, mesh: TriangleMesh, length: float) -> HeatFlow:
-        """Over about `length`, in units of the square root of the area."""
+    def __init__(self, mesh: TriangleMesh, length: float) -> None:
         unit = mesh.with_unit_area()
         level = Level.of(unit)
-        mass, prolongation = level.mass, None
-        if mesh.n_vertices > LARGE:
-            prolongation, level = level.coarsened(max(round((CELLS_PER_LENGTH / length) ** 2), LEAST_CELLS))
-            mass = csr_matrix(prolongation.T @ mass)
+        self._mass, self._prolongation = level.mass, None
+        if len(level.areas) > LARGE:
+            cells = max(round((CELLS_PER_LENGTH / length) ** 2), LEAST_CELLS)
+            self._prolongation, level = level.coarsened(cells)
+            self._mass = csr_matrix(self._prolongation.T @ self._mass)
         system = csr_matrix(level.mass + np.float32(length**2) * level.stiffness)
+        factor: NestedDissectionFactor | None
         try:
             factor = NestedDissectionFactor(system, level.positions)
         except SingularError:
             factor = None
-        if factor is None or factor.n_negative:
+        if factor is not None and not factor.n_negative:
+            self._factor: _Factor = factor
+        else:
             # Slivers weigh so much more than areas that single precision loses these.
             masses = diags(unit_area_masses(unit))
-            return cls(csr_matrix(masses), splu(csc_matrix(masses + length**2 * stiffness_matrix(unit))), None)
-        return cls(mass, factor, prolongation)
+            self._mass, self._prolongation = csr_matrix(masses), None
+            self._factor = splu(csc_matrix(masses + length**2 * stiffness_matrix(unit)))
 
     def smooth(self, values: FloatArray) -> FloatArray:
         """(n, k) values at vertices, averaged over the surface within about the length."""
-        smooth = self.factor.solve(self.mass @ values.astype(self.mass.dtype))
-        return np.asarray(smooth if self.prolongation is None else self.prolongation @ smooth)
+        smooth = self._factor.solve(self._mass @ values.astype(self._mass.dtype))
+        return np.asarray(smooth if self._prolongation is None else self._prolongation @ smooth)
