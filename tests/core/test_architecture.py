@@ -31,6 +31,7 @@ CHAIN = [
     "cut",
     "labelling",
     "description",
+    "parts",
     "grouping",
     "learning",
     "region_atlas",

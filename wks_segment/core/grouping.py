@@ -12,9 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_matrix
 
 from .mesh import BoolArray, FloatArray, IntArray
-from .regions import FaceAdjacency, merge_crumbs
+from .parts import gains_of_joining, parts
+from .regions import FaceAdjacency, connected_regions, merge_crumbs
 from .shape import border_weights
 from .surface import Surface
 
@@ -29,7 +31,7 @@ EMPTY = 1e-6
 
 BEST_WITHIN, MOST_SEGMENTS = 0.06, 16
 """The number of segments, where it is left open: the most, up to this many, that are nearly as certain as any."""
-MOST_CUT = 11.5
+MOST_CUT = 12.0
 """Border by area, on average over groups, above which these are pieces of what people see as one."""
 
 
@@ -44,19 +46,32 @@ class Ground:
         Of the m original faces.
     lengths : (p,) array
         Weighted border length between neighbours, for a surface of area 1.
+    part : (m,) int array
+        Part of each face as a person would cut this pose.
     """
 
     surface: Surface
     adjacency: FaceAdjacency
     lengths: FloatArray
+    part: IntArray
 
     @classmethod
     def of(cls, surface: Surface) -> Ground:
-        """Find the neighbours and weigh their borders."""
+        """Find the neighbours, weigh their borders and cut."""
         original = surface.original
         adjacency = FaceAdjacency.of(surface.welded_faces, original.vertices)
-        weights = border_weights(surface, adjacency)
-        return cls(surface, adjacency, weights * adjacency.lengths / np.sqrt(original.area))
+        weights, curvature = border_weights(surface, adjacency)
+        lengths = weights * adjacency.lengths / np.sqrt(original.area)
+        return cls(surface, adjacency, lengths, parts(surface, adjacency, lengths, curvature))
+
+    def unlike_parts(self, labels: IntArray) -> float:
+        """Rand-index error of the connected regions of (m,) labels against the parts, by area (Rand, 1971)."""
+        region = connected_regions(labels, self.adjacency)
+        shares = self.surface.original.face_areas / self.surface.original.area
+        both = coo_matrix((shares, (region, self.part))).tocsr()
+        both.sum_duplicates()
+        each = np.square(np.bincount(region, shares)).sum() + np.square(np.bincount(self.part, shares)).sum()
+        return float(each - 2 * np.square(both.data).sum())
 
 
 @dataclass(frozen=True)
@@ -150,7 +165,7 @@ class Grouping:
             by_chance[count - 1 - step] = np.square(overlaps.sum(axis=1)).sum()
             np.fill_diagonal(borders, 0)
             cuts[count - 1 - step] = min(np.mean((borders.sum(axis=1) / areas)[alive]), 1 / EMPTY)
-            gain = _gains_of_joining(borders, areas)
+            gain = gains_of_joining(borders, borders.sum(axis=1), areas)
             touch = borders > 0
             small = (np.minimum(areas[:, None], areas) < LEAST_SHARE) | scattered[:, None] | scattered
             # The small before the large, then what touches before what does not; each of these outweighs the rest.
@@ -196,15 +211,3 @@ class Grouping:
         """
         pieces = np.flatnonzero(self.cuts[:most] > MOST_CUT)
         return max(int(pieces[0]) if len(pieces) else most, min(most, 2))
-
-
-def _gains_of_joining(borders: FloatArray, areas: FloatArray) -> FloatArray:
-    """(K, K) by how much the sum of border by area falls if two of some groups are joined.
-
-    Given (K, K) weighted borders between them and their (K,) areas. Normalized cuts (Shi and Malik, 2000), as
-    Golovinskiy and Funkhouser have them for parts ("Randomized cuts for 3D mesh analysis", 2008, section 4.2).
-    """
-    whole = borders.sum(axis=1)
-    alone = (whole / areas)[:, None] + whole / areas
-    joined = (whole[:, None] + whole - 2 * borders) / (areas[:, None] + areas)
-    return np.asarray(alone - joined)

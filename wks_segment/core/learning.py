@@ -16,8 +16,8 @@ from .regions import connected_regions
 from .smoothing import HeatFlow
 
 AUTO: tuple[CovarianceType, ...] = ("shared", "diag")
-"""Covariances that `covariance_type="auto"` tries on several poses of one mesh; else it takes the first."""
-CANDIDATES = 3
+"""Covariances that `covariance_type="auto"` tries on several poses; of one alone it takes the first."""
+CANDIDATES = 4
 """Mixtures of each covariance whose groups are compared."""
 EARNED = 0.8
 """Another covariance than the first is taken if its labels disagree less than this share as much between the poses."""
@@ -55,9 +55,10 @@ class Candidates:
 
     @threadpool_limits.wrap(limits=1, user_api="blas")  # on arrays this small, threads wait for each other
     def best(self, tick: Callable[[float], None]) -> tuple[GaussianMixture, Grouping]:
-        """The mixture whose groups are the most certain, and its grouping.
+        """A mixture, and its grouping.
 
-        On poses of one mesh that is the one whose labels agree best between the poses.
+        On poses of one mesh the mixture whose labels agree best between the poses; else the one whose regions are most
+        like the parts that people would cut each shape into.
         """
         contacts: list[list[Contacts]] = [[] for _ in self.mixtures]
         likeliest: list[list[IntArray]] = [[] for _ in self.mixtures]
@@ -81,23 +82,31 @@ class Candidates:
             means = [mean.with_changes(np.stack(kept)) for mean, kept in zip(means, samples, strict=True)]
         groupings = [Grouping.of(mean) for mean in means]
         if drawn is None:
-            scores = [grouping.certainties[self.number(grouping) - 1] for grouping in groupings]
+            losses = [
+                self._unlike_parts(grouping, grounds, of_faces)
+                for grouping, of_faces in zip(groupings, likeliest, strict=True)
+            ]
         else:
-            scores = [self._agreement(grouping, kept) for grouping, kept in zip(groupings, samples, strict=True)]
-        # What has more to fit must earn it.
-        first_type = self.mixtures[0].covariance_type
-        losses = [
-            (1 - score) / (1 if mixture.covariance_type == first_type else EARNED)
-            for score, mixture in zip(scores, self.mixtures, strict=True)
-        ]
+            # What has more to fit must earn it.
+            first_type = self.mixtures[0].covariance_type
+            losses = [
+                self._disagreement(grouping, kept) / (1 if mixture.covariance_type == first_type else EARNED)
+                for grouping, kept, mixture in zip(groupings, samples, self.mixtures, strict=True)
+            ]
         best = int(np.argmin(losses))
         return self.mixtures[best], self._without_scattered(means[best], groupings[best], grounds, likeliest[best])
 
-    def _agreement(self, grouping: Grouping, posteriors: list[FloatArray]) -> float:
-        """Share of faces and pairs of poses that have the same label, given posteriors of some faces in each pose."""
+    def _unlike_parts(self, grouping: Grouping, grounds: Sequence[Ground], components: Sequence[IntArray]) -> float:
+        """How unlike the parts of the poses the regions are, given the likeliest component of each face in each."""
+        group = grouping.groups(grouping.number_of_wholes(self.number(grouping)))
+        poses = zip(grounds, components, strict=True)
+        return float(np.mean([ground.unlike_parts(group[of_faces]) for ground, of_faces in poses]))
+
+    def _disagreement(self, grouping: Grouping, posteriors: list[FloatArray]) -> float:
+        """Share of faces and pairs of poses with different labels, given posteriors of some faces in each pose."""
         number = self.number(grouping)
         labels = np.stack([(each @ np.eye(number)[grouping.groups(number)]).argmax(axis=1) for each in posteriors])
-        return float((labels[:, None] == labels).mean())
+        return float((labels[:, None] != labels).mean())
 
     def _without_scattered(
         self, contacts: Contacts, grouping: Grouping, grounds: Sequence[Ground], components: Sequence[IntArray]

@@ -190,7 +190,7 @@ class PoseSegmentation(PoseDescriber):
         if self.preset == "paper":
             (self.mixture_,) = fit_mixtures(samples, shares, wanted, covariance_type, self.random_state, 1, mixing)
         else:
-            types = AUTO[: 1 + of_one_mesh(poses)] if covariance_type == "auto" else (covariance_type,)
+            types = AUTO[: len(poses)] if covariance_type == "auto" else (covariance_type,)
             mixtures = fine_mixtures(samples, shares, wanted, types, self.n_segments == "auto", mixing)
             candidates = Candidates(poses, mixtures, self._standardised, self._number)
             self.mixture_, self.grouping_ = candidates.best(grouping)
@@ -385,8 +385,8 @@ class PoseSegmentation(PoseDescriber):
         model.centre_, model.spread_ = arrays["centre"], arrays["spread"]
         model.grouping_ = model.regions_ = None
         if "joins" in arrays:
-            order = (arrays[name] for name in ("certainties", "by_chance", "cuts"))
-            model.grouping_ = Grouping(arrays["joins"].astype(np.int64), *order)
+            joins = arrays["joins"].astype(np.int64)
+            model.grouping_ = Grouping(joins, arrays["certainties"], arrays["by_chance"], arrays["cuts"])
             model.regions_ = RegionAtlas.of_arrays(arrays)
         model.mixture_ = GaussianMixture(covariance_type, arrays["weights"], arrays["means"], arrays["covariances"])
         return model

@@ -123,8 +123,8 @@ def log_thickness(surface: Surface, normals: FloatArray) -> FloatArray:
     return HeatFlow(mesh, THICKNESS_LENGTH).smooth(logs)[:, 0].astype(np.float64)
 
 
-def border_weights(surface: Surface, adjacency: FaceAdjacency) -> FloatArray:
-    """(p,) weight of the border between neighbours: 1 where nothing speaks for a cut, less where people cut."""
+def border_weights(surface: Surface, adjacency: FaceAdjacency) -> tuple[FloatArray, FloatArray]:
+    """(p,) weight of the border between neighbours, 1 where nothing speaks for a cut, and the fine curvature there."""
     original = surface.original
     normals = vertex_normals(surface)
     fine, coarse = (smooth_normals(surface, normals, length) for length in (FINE, COARSE))
@@ -134,7 +134,8 @@ def border_weights(surface: Surface, adjacency: FaceAdjacency) -> FloatArray:
     a, b = adjacency.pairs.T
     distances = np.maximum(np.linalg.norm(centres[a] - centres[b], axis=1), SHORTEST)
     step = np.minimum(np.abs(thickness[a] - thickness[b]) / distances, MOST_STEP)
-    return np.asarray(np.exp(CREASE * np.clip(curvature, -MOST_CONCAVE, MOST_CONVEX) - STEP * step))
+    weights = np.exp(CREASE * np.clip(curvature, -MOST_CONCAVE, MOST_CONVEX) - STEP * step)
+    return weights, curvature_across(surface, fine, adjacency)
 
 
 def _touching(
