@@ -28,11 +28,11 @@ def figure(left=0.0, right=0.0, subdivisions=4):
     return TriangleMesh(posed, sphere.faces)
 
 
-def limb(name, subdivisions=4):
-    """Faces at the end of a limb."""
+def limb(name, subdivisions=4, radius=0.15):
+    """Faces at the end of a limb, up to an angle from its axis on the sphere that it was pulled out of."""
     sphere = icosphere(subdivisions)
     axis = np.array(LIMBS[name][0]) / np.linalg.norm(LIMBS[name][0])
-    return np.arccos(np.clip(sphere.vertices[sphere.faces].mean(axis=1) @ axis, -1, 1)) < 0.15
+    return np.arccos(np.clip(sphere.vertices[sphere.faces].mean(axis=1) @ axis, -1, 1)) < radius
 
 
 def name_of(names, faces):
@@ -103,6 +103,17 @@ def test_polygons_of_parts_on_both_sides_have_a_side(model):
         assert (side[limb(f"left {one}")] == 1).all()
         assert (side[limb(f"right {one}")] == -1).all()
     assert (side[limb("head")] == 0).all()
+
+
+def test_a_part_in_the_middle_has_no_side_however_the_sides_are_bent(model):
+    """The tail is about as large as a foot and of the same segment, and one foot is nearer to it than the other."""
+    for left, right in ((0.5, -0.3), (-0.3, 0.5), (0.0, 0.6)):
+        mesh = figure(left, right)
+        ends = {"left leg": limb("left leg"), "right leg": limb("right leg"), "tail": limb("tail", radius=0.22)}
+        labels = np.any(list(ends.values()), axis=0).astype(int)
+        side = model.polygon_sides(mesh, np.arange(mesh.n_faces), labels)
+        found = {one: np.unique(side[faces]).tolist() for one, faces in ends.items()}
+        assert found == {"left leg": [1], "right leg": [-1], "tail": [0]}
 
 
 def test_a_saved_model_gives_the_same_names(model, tmp_path):
