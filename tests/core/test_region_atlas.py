@@ -3,7 +3,7 @@ import pytest
 from shapes import icosphere
 
 from wks_segment.core import PoseSegmentation, TriangleMesh
-from wks_segment.core.region_atlas import sides
+from wks_segment.core.region_atlas import RegionAtlas, Traits, sides
 
 LIMBS = {
     "head": ((0, 0, 1), 1.2, 0.35), "left arm": ((1, 0, 0.3), 2.5, 0.2), "right arm": ((-1, 0, 0.3), 2.5, 0.2),
@@ -137,3 +137,22 @@ def test_sides_need_one_of_the_same_segment_opposite():
     centres = np.array([(1, 0, 0), (-1, 0.1, 0), (0.01, 0, 1), (0.9, 0, -2), (-0.9, 0, -2), (2, 0, 3)])
     assert sides(centres, np.array([0, 0, 1, 2, 2, 3])).tolist() == [1, -1, 0, 1, -1, 0]
     assert sides(centres, np.array([0, 1, 1, 2, 2, 3])).tolist() == [0, 0, 0, 1, -1, 0]
+
+
+def test_in_poses_of_one_mesh_the_order_says_which_region_is_which(model):
+    """In the second pose left and right look as if they had changed places."""
+    known = model.regions_.traits
+    order = np.arange(len(known.segment))
+    left = int(np.argmax(model.regions_.side == 1))
+    right = int(np.argmax((known.segment == known.segment[left]) & (model.regions_.side == -1)))
+    order[[left, right]] = right, left
+    swapped = Traits(
+        known.segment, known.area[order], known.signature[order], known.handedness[order],
+        known.distance[np.ix_(order, order)],
+    )  # fmt: skip
+    assert np.abs(known.handedness[left] - known.handedness[right]).max() > 0.01
+    centres = np.zeros((len(order), 3))
+    found = RegionAtlas.learned(model.regions_.n_groups, [known, swapped], centres)
+    np.testing.assert_allclose(found.traits.handedness, known.handedness)
+    in_order = RegionAtlas.learned(model.regions_.n_groups, [known, swapped], centres, alike=True)
+    np.testing.assert_allclose(in_order.traits.handedness, (known.handedness + swapped.handedness) / 2)

@@ -180,13 +180,16 @@ class RegionAtlas:
     noise: FloatArray
 
     @classmethod
-    def learned(cls, n_groups: int, poses: Sequence[Traits], centres: FloatArray) -> RegionAtlas:
-        """From one or several poses, and the (r, 3) centres of the first one's regions, best at rest."""
+    def learned(cls, n_groups: int, poses: Sequence[Traits], centres: FloatArray, alike: bool = False) -> RegionAtlas:
+        """From one or several poses, and the (r, 3) centres of the first one's regions, best at rest.
+
+        `alike`: the poses are of one mesh, and have their regions in the same order.
+        """
         side = sides(centres, poses[0].segment)
         atlas = cls(n_groups, poses[0], side, _scaled(NOISE, poses[0]))
         # A mean over poses finds regions of each more surely than the first pose does.
         for _ in range(2):
-            names = [atlas.named(pose) for pose in poses]
+            names = [np.arange(len(pose.segment)) if alike else atlas.named(pose) for pose in poses]
             mean = _mean(atlas.traits, poses, names)
             noise = _scaled(NOISE, mean)
             if len(poses) > 1:
