@@ -3,7 +3,7 @@ import pytest
 from shapes import icosphere
 
 from wks_segment.core import PoseSegmentation, TriangleMesh
-from wks_segment.core.region_atlas import sides
+from wks_segment.core.region_atlas import RegionAtlas, Traits, sides
 
 LIMBS = {
     "head": ((0, 0, 1), 1.2, 0.35), "left arm": ((1, 0, 0.3), 2.5, 0.2), "right arm": ((-1, 0, 0.3), 2.5, 0.2),
@@ -28,11 +28,11 @@ def figure(left=0.0, right=0.0, subdivisions=4):
     return TriangleMesh(posed, sphere.faces)
 
 
-def limb(name, subdivisions=4):
-    """Faces at the end of a limb."""
+def limb(name, subdivisions=4, radius=0.15):
+    """Faces at the end of a limb, up to an angle from its axis on the sphere that it was pulled out of."""
     sphere = icosphere(subdivisions)
     axis = np.array(LIMBS[name][0]) / np.linalg.norm(LIMBS[name][0])
-    return np.arccos(np.clip(sphere.vertices[sphere.faces].mean(axis=1) @ axis, -1, 1)) < 0.15
+    return np.arccos(np.clip(sphere.vertices[sphere.faces].mean(axis=1) @ axis, -1, 1)) < radius
 
 
 def name_of(names, faces):
@@ -105,6 +105,17 @@ def test_polygons_of_parts_on_both_sides_have_a_side(model):
     assert (side[limb("head")] == 0).all()
 
 
+def test_a_part_in_the_middle_has_no_side_however_the_sides_are_bent(model):
+    """The tail is about as large as a foot and of the same segment, and one foot is nearer to it than the other."""
+    for left, right in ((0.5, -0.3), (-0.3, 0.5), (0.0, 0.6)):
+        mesh = figure(left, right)
+        ends = {"left leg": limb("left leg"), "right leg": limb("right leg"), "tail": limb("tail", radius=0.22)}
+        labels = np.any(list(ends.values()), axis=0).astype(int)
+        side = model.polygon_sides(mesh, np.arange(mesh.n_faces), labels)
+        found = {one: np.unique(side[faces]).tolist() for one, faces in ends.items()}
+        assert found == {"left leg": [1], "right leg": [-1], "tail": [0]}
+
+
 def test_a_saved_model_gives_the_same_names(model, tmp_path):
     model.save(tmp_path / "model.json")
     mesh = figure(0.1, 0.5)
@@ -126,3 +137,22 @@ def test_sides_need_one_of_the_same_segment_opposite():
     centres = np.array([(1, 0, 0), (-1, 0.1, 0), (0.01, 0, 1), (0.9, 0, -2), (-0.9, 0, -2), (2, 0, 3)])
     assert sides(centres, np.array([0, 0, 1, 2, 2, 3])).tolist() == [1, -1, 0, 1, -1, 0]
     assert sides(centres, np.array([0, 1, 1, 2, 2, 3])).tolist() == [0, 0, 0, 1, -1, 0]
+
+
+def test_in_poses_of_one_mesh_the_order_says_which_region_is_which(model):
+    """In the second pose left and right look as if they had changed places."""
+    known = model.regions_.traits
+    order = np.arange(len(known.segment))
+    left = int(np.argmax(model.regions_.side == 1))
+    right = int(np.argmax((known.segment == known.segment[left]) & (model.regions_.side == -1)))
+    order[[left, right]] = right, left
+    swapped = Traits(
+        known.segment, known.area[order], known.signature[order], known.handedness[order],
+        known.distance[np.ix_(order, order)],
+    )  # fmt: skip
+    assert np.abs(known.handedness[left] - known.handedness[right]).max() > 0.01
+    centres = np.zeros((len(order), 3))
+    found = RegionAtlas.learned(model.regions_.n_groups, [known, swapped], centres)
+    np.testing.assert_allclose(found.traits.handedness, known.handedness)
+    in_order = RegionAtlas.learned(model.regions_.n_groups, [known, swapped], centres, alike=True)
+    np.testing.assert_allclose(in_order.traits.handedness, (known.handedness + swapped.handedness) / 2)

@@ -48,6 +48,10 @@ ALIKE = 0.5
 """Parts on two sides are one part twice if the smaller has at least this share of the larger one's area."""
 MIDDLE = 0.05
 """Regions nearer than this to each other, across the mirror plane, are neither left nor right."""
+SIDE_REACH = 0.15
+"""What `REACH` is, where a part's side is that of what is near to it."""
+SURE = 0.5
+"""A part is left or right from this mean of `side_field` on: heat from one side is three times that from the other."""
 
 
 @dataclass(frozen=True)
@@ -176,13 +180,16 @@ class RegionAtlas:
     noise: FloatArray
 
     @classmethod
-    def learned(cls, n_groups: int, poses: Sequence[Traits], centres: FloatArray) -> RegionAtlas:
-        """From one or several poses, and the (r, 3) centres of the first one's regions, best at rest."""
+    def learned(cls, n_groups: int, poses: Sequence[Traits], centres: FloatArray, alike: bool = False) -> RegionAtlas:
+        """From one or several poses, and the (r, 3) centres of the first one's regions, best at rest.
+
+        `alike`: the poses are of one mesh, and have their regions in the same order.
+        """
         side = sides(centres, poses[0].segment)
         atlas = cls(n_groups, poses[0], side, _scaled(NOISE, poses[0]))
         # A mean over poses finds regions of each more surely than the first pose does.
         for _ in range(2):
-            names = [atlas.named(pose) for pose in poses]
+            names = [np.arange(len(pose.segment)) if alike else atlas.named(pose) for pose in poses]
             mean = _mean(atlas.traits, poses, names)
             noise = _scaled(NOISE, mean)
             if len(poses) > 1:
@@ -285,9 +292,14 @@ def sides(centres: FloatArray, segment: IntArray) -> IntArray:
 
 
 def side_field(surface: Surface, region: IntArray, side: IntArray) -> FloatArray:
-    """(m,) positive on the left, negative on the right, by what is near; given each face's region and their sides."""
-    inside = _at_vertices(surface, region, len(side))
-    return surface.to_faces(HeatFlow(surface.mesh, 1.0).smooth(inside @ side[:, None].astype(np.float64)))[:, 0]
+    """(m,) 1 on the left to −1 on the right, by what is near; given each face's region and the side of each region.
+
+    The share of heat from the left less that from the right, so that what is far from both, as a tail, is as clearly
+    in the middle as what lies between them.
+    """
+    inside = _at_vertices(surface, region, len(side)) @ np.stack([side > 0, side < 0], axis=1).astype(np.float64)
+    left, right = np.maximum(HeatFlow(surface.mesh, SIDE_REACH).smooth(inside), 0).T
+    return surface.to_faces(((left - right) / np.maximum(left + right, LEAST_OVERLAP))[:, None])[:, 0]
 
 
 def sides_of_parts(
@@ -318,10 +330,8 @@ def sides_of_parts(
     area = np.bincount(of_faces, weights, count)
     total = np.maximum(area, np.finfo(float).tiny)
     mean = np.bincount(of_faces, weights * values, count) / total
-    spread = np.sqrt(np.maximum(np.bincount(of_faces, weights * values**2, count) / total - mean**2, 0))
     large = area >= least_share * original.area
-    # A part in the middle is left on one half and right on the other, or hardly anything.
-    sided = np.flatnonzero(large & (np.abs(mean) > spread))
+    sided = np.flatnonzero(large & (np.abs(mean) > SURE))
     alike = np.minimum.outer(area[sided], area[sided]) >= ALIKE * np.maximum.outer(area[sided], area[sided])
     opposite = (label_of[sided][:, None] == label_of[sided]) & (np.outer(mean[sided], mean[sided]) < 0) & alike
     side = np.zeros(count, dtype=np.int64)

@@ -521,7 +521,8 @@ class PoseSegmentation(PoseDescriber):
             regions = Regions.of(*self._clean(alike, None, None, n_groups=n_groups), alike[0].surface.original)
             found.append(regions)
             traits += [regions.traits(pose.surface, self._fields(pose)) for pose in alike]
-        return RegionAtlas.learned(n_groups, traits, found[0].centres(first if rest is None else rest))
+        centres = found[0].centres(first if rest is None else rest)
+        return RegionAtlas.learned(n_groups, traits, centres, alike=len(found) == 1)
 
     def _named_regions(self, pose: PoseSignature, min_share: float | None) -> IntArray:
         """(m,) region of each face, numbered as in the atlas, and on from there."""
