@@ -59,8 +59,9 @@ class PoseSegmentation(PoseDescriber):
         `Grouping.best_number`; not for the paper's setting.
     covariance_type : "auto", "shared", "diag", "full", "tied" or "spherical"
         "shared" is one diagonal covariance for all components, the paper's remark and the most robust on bodies that
-        were not learned from. "auto" takes it, unless the poses are of one mesh and "diag" gives labels that agree far
-        better between them. "tied" and "full" have one component a segment.
+        were not learned from. "auto" tries "diag", too: on poses of one mesh its labels must agree far better between
+        these, on several bodies its regions must be more like what creases cut. "tied" and "full" have one component a
+        segment.
     n_eigenpairs : int
         Eigenpairs of each pose, without the zero modes of further components.
     n_energies : int
