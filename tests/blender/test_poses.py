@@ -378,13 +378,18 @@ def learn(settings, *objects, **values):
 def test_polygons_that_a_modifier_hides_are_labelled_like_their_neighbours(settings):
     obj = limbed()
     learn(settings, obj)
-    usual = labels_of(obj)
     obj.modifiers.new("Decimate", "DECIMATE").ratio = 0.4
-    hidden = np.bincount(read(obj).polygon_of, minlength=len(usual)) == 0
+    hidden = np.bincount(read(obj).polygon_of, minlength=len(obj.data.polygons)) == 0
     assert hidden.sum() > 100, "the modifier hides nothing: the test is void"
     bpy.ops.wks_segment.apply()
-    on_limbs = hidden & (usual != np.bincount(usual).argmax())
-    assert (labels_of(obj) == usual)[on_limbs].mean() > 0.6
+    labels = labels_of(obj)
+    centres = np.array([polygon.center for polygon in obj.data.polygons])
+    distances = np.linalg.norm(centres[hidden][:, None] - centres[~hidden], axis=2)
+    # Several can be equally near: it is the label of one of them.
+    nearest = distances <= distances.min(axis=1, keepdims=True) * (1 + 1e-4)
+    alike = labels[hidden][:, None] == labels[~hidden]
+    assert (nearest & alike).any(axis=1).all()
+    assert len(np.unique(labels)) > 1
 
 
 def test_seams_of_an_imported_file_are_no_borders(settings, tmp_path):
