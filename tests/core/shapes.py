@@ -82,3 +82,26 @@ def together(*meshes):
         np.concatenate([mesh.vertices for mesh in meshes]),
         np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]),
     )
+
+
+LIMBS = {
+    "head": ((0, 0, 1), 1.2, 0.35), "left arm": ((1, 0, 0.3), 2.5, 0.2), "right arm": ((-1, 0, 0.3), 2.5, 0.2),
+    "left leg": ((0.5, 0, -1), 2.5, 0.25), "right leg": ((-0.5, 0, -1), 2.5, 0.25), "nose": ((0, -0.7, 0.7), 0.5, 0.2),
+    "tail": ((0, 0.9, -0.3), 0.7, 0.2),
+}  # fmt: skip
+
+
+def figure(left=0.0, right=0.0, subdivisions=4):
+    """A body that looks towards −y, as in Blender, with arms and legs; `left` and `right` (radians) lift a side."""
+    sphere = icosphere(subdivisions)
+    points = sphere.vertices.copy()
+    for axis, length, width in LIMBS.values():
+        unit = np.array(axis) / np.linalg.norm(axis)
+        angle = np.arccos(np.clip(sphere.vertices @ unit, -1, 1))
+        points = points + length * np.exp(-((angle / width) ** 2))[:, None] * unit
+    # Beyond the body either side turns about y, more the further out: nearly isometric.
+    out = np.maximum(np.abs(points[:, 0]) - 0.8, 0)
+    turn = np.where(points[:, 0] > 0, left, -right) * out / 2
+    x, y, z = points.T
+    posed = np.stack([x * np.cos(turn) + z * np.sin(turn), y, z * np.cos(turn) - x * np.sin(turn)], axis=1)
+    return TriangleMesh(posed, sphere.faces)

@@ -57,8 +57,8 @@ class Candidates:
     def best(self, tick: Callable[[float], None]) -> tuple[GaussianMixture, Grouping]:
         """A mixture, and its grouping.
 
-        On poses of one mesh the mixture whose labels agree best between the poses; else the one whose regions are most
-        like the parts that people would cut each shape into.
+        On poses of one mesh the mixture whose labels agree best between the poses; on several meshes the one whose
+        regions are most like the parts that people would cut each into; on one alone the one that is surest.
         """
         contacts: list[list[Contacts]] = [[] for _ in self.mixtures]
         likeliest: list[list[IntArray]] = [[] for _ in self.mixtures]
@@ -81,7 +81,9 @@ class Candidates:
         if drawn is not None:
             means = [mean.with_changes(np.stack(kept)) for mean, kept in zip(means, samples, strict=True)]
         groupings = [Grouping.of(mean) for mean in means]
-        if drawn is None:
+        if len(self.poses) == 1:
+            losses = [-float(grouping.certainties[self.number(grouping) - 1]) for grouping in groupings]
+        elif drawn is None:
             losses = [
                 self._unlike_parts(grouping, grounds, of_faces)
                 for grouping, of_faces in zip(groupings, likeliest, strict=True)
