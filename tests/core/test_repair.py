@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from shapes import creature, grid, icosphere
+from shapes import creature, figure, grid, icosphere
 
 from wks_segment.core import PoseSegmentation, TriangleMesh, prepare_surface
 from wks_segment.core.repair import small_holes, without_spikes
@@ -71,9 +71,9 @@ def test_the_cap_belongs_to_no_face_of_the_artist():
 
 
 def test_labels_survive_spikes_and_holes():
-    poses = [creature(bend, 4) for bend in (0.0, 0.5)]
+    poses = [figure(0.0, 0.0), figure(0.5, 0.1), figure(-0.3, 0.6)]
     model = PoseSegmentation(4, n_eigenpairs=60, n_energies=40).fit(poses)
-    clean = creature(0.25, 4)
+    clean = figure(0.25, 0.25)
     expected = model.segment_faces(clean)
     generator = np.random.default_rng(0)
     vertices = clean.vertices.copy()
