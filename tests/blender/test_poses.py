@@ -20,6 +20,7 @@ from builders import (
 
 from wks_segment.blender import poses as reader
 from wks_segment.blender.characters import Character, group, mesh_objects
+from wks_segment.blender.creature import build_creature
 from wks_segment.blender.errors import UserError
 
 pytestmark = pytest.mark.usefixtures("scene")
@@ -58,6 +59,43 @@ def test_negative_scale_mirrors_and_keeps_the_area():
     pose = read(cube)
     np.testing.assert_allclose(extent(pose), ((-2, 0, 0), (0, 1, 1)), atol=1e-6)
     assert pose.mesh.area == pytest.approx(4 * 2 + 2 * 1, rel=1e-5)
+
+
+def test_upright_is_as_the_object_itself_has_it():
+    cube = box(0, 1)
+    cube.location, cube.rotation_euler, cube.scale = (3, 0, 1), (0.3, 2, 1), (1, 2, 3)
+    upright = read(cube).upright.vertices
+    np.testing.assert_allclose(np.ptp(upright, axis=0), (1, 2, 3), atol=1e-5)
+    left = coordinates(cube.data)[:, 0] > 0.5
+    assert upright[left, 0].min() > upright[~left, 0].max() + 0.9
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_in_a_mirror_left_is_what_is_seen_on_the_left(axis):
+    """Left of someone who looks along −Y and is upright: turned upside down or round, it changes sides."""
+    cube = box(0, 1)
+    cube.scale[axis] = -1
+    upright = read(cube).upright.vertices
+    triple = np.linalg.det(read(cube).axes)
+    assert triple == pytest.approx(1)
+    left = coordinates(cube.data)[:, 0] > 0.5
+    assert upright[left, 0].max() < upright[~left, 0].min() + 1e-6
+
+
+def test_upright_is_at_rest_and_as_the_armature_has_it():
+    obj = limbed_rigged()
+    armature = obj.parent
+    armature.rotation_euler.z = np.pi
+    bpy.context.scene.frame_set(11)
+    (pose,) = reader.read_objects(bpy.context, [Character((obj,))])
+    np.testing.assert_allclose(pose.upright.vertices, coordinates(obj.data), atol=1e-5)
+    assert np.abs(pose.mesh.vertices * (-1, -1, 1) - coordinates(obj.data)).max() > 0.5
+
+
+def test_the_largest_object_says_where_left_is():
+    eye, body = box(name="A"), limbed("Body")
+    eye.rotation_euler.z = 2
+    np.testing.assert_allclose(read(eye, body).axes, np.eye(3), atol=1e-6)
 
 
 def test_parent_transform_is_applied():
@@ -127,6 +165,46 @@ def test_ngons_are_triangulated_and_know_their_polygon():
 
 def polygon_centres(obj):
     return np.array([polygon.center for polygon in obj.data.polygons])
+
+
+def darts():
+    """Two objects of one quad, which Blender must cut from corner 0 in the one and from corner 1 in the other."""
+    corners = np.array([(0, 0, 0), (1, -1, 0), (2, 0, 0), (1, 2, 0)], dtype=float)
+    inward = corners.copy()
+    inward[1, 1] = 1
+    quad = [(0, 1, 2, 3)]
+    return mesh_object(corners, quad, "Kite"), mesh_object(inward, quad, "Dart")
+
+
+def test_poses_of_the_same_polygons_are_cut_alike():
+    kite, dart = darts()
+    assert not read(kite).is_mesh_of(read(dart)), "Blender cuts them alike"
+    first, second = reader.read_objects(bpy.context, [Character((kite,)), Character((dart,))])
+    assert first.is_mesh_of(second)
+    np.testing.assert_array_equal(second.mesh.vertices, read(dart).mesh.vertices)
+    np.testing.assert_array_equal(first.mesh.faces, read(kite).mesh.faces)
+
+
+def test_poses_of_other_polygons_keep_their_triangles():
+    kite = darts()[0]
+    halves = mesh_object(coordinates(kite.data), [(0, 1, 3), (1, 2, 3)])
+    corner = mesh_object(coordinates(kite.data), [(0, 1, 2)])
+    for other in (halves, corner):
+        _, pose = reader.read_objects(bpy.context, [Character((kite,)), Character((other,))])
+        np.testing.assert_array_equal(pose.mesh.faces, read(other).mesh.faces)
+
+
+def test_frames_and_rest_position_are_cut_alike(scene):
+    creature = Character((build_creature(scene),))
+    cuts = []
+    for frame in (5, 20):
+        scene.frame_set(frame)
+        cuts.append(reader.read_pose(bpy.context, creature, "a pose"))
+    assert not cuts[0].is_mesh_of(cuts[1]), "Blender cuts them alike"
+    first, second = reader.read_frames(bpy.context, creature, [5, 20])
+    assert first.is_mesh_of(second)
+    np.testing.assert_array_equal(first.rest.faces, first.mesh.faces)
+    np.testing.assert_allclose(first.rest.vertices, coordinates(creature.objects[0].data), atol=1e-6)
 
 
 def test_subdivided_faces_map_to_the_own_polygons():

@@ -45,9 +45,11 @@ class Pose:
     vertex_of : (n,) int array
         The character's own vertex that each vertex is, numbered in the same way; -1 where modifiers change faces, so
         that only `polygon_of` tells what is where.
+    axes : (3, 3) array
+        Columns: the character's own x, y and z in world space. x points to its left.
     rest : TriangleMesh, optional
         The same triangles in the rest position of the character's armature, if it has one: where the artist put loose
-        parts together.
+        parts together. The axes are then those that it has there.
     """
 
     name: str
@@ -55,7 +57,14 @@ class Pose:
     mesh: TriangleMesh
     polygon_of: IntArray
     vertex_of: IntArray
+    axes: FloatArray
     rest: TriangleMesh | None = None
+
+    @property
+    def upright(self) -> TriangleMesh:
+        """The rest position, or the pose where there is none, as the character itself sees it: x points to its left."""
+        mesh = self.mesh if self.rest is None else self.rest
+        return TriangleMesh(mesh.vertices @ self.axes, mesh.faces)
 
     def is_like(self, other: Pose) -> bool:
         """Whether the other pose is the same surface at the same place."""
@@ -70,6 +79,24 @@ class Pose:
         """Whether the other pose has the same triangles between as many vertices."""
         return self.mesh.n_vertices == other.mesh.n_vertices and np.array_equal(self.mesh.faces, other.mesh.faces)
 
+    def cut_as(self, other: Pose) -> Pose:
+        """The pose with the triangles of another one, if they are of the same polygons; else as it is.
+
+        Blender cuts a polygon that is not flat in one way here and in another way there.
+        """
+        if self.is_mesh_of(other) or not self._has_polygons_of(other):
+            return self
+        rest = None if self.rest is None else TriangleMesh(self.rest.vertices, other.mesh.faces)
+        return replace(self, mesh=TriangleMesh(self.mesh.vertices, other.mesh.faces), rest=rest)
+
+    def _has_polygons_of(self, other: Pose) -> bool:
+        """Whether the other pose has the same polygons between as many vertices, however they are cut."""
+        count = self.mesh.n_vertices
+        if count != other.mesh.n_vertices or not np.array_equal(self.polygon_of, other.polygon_of):
+            return False
+        ours, theirs = (np.unique(np.repeat(p.polygon_of, 3) * count + p.mesh.faces.ravel()) for p in (self, other))
+        return np.array_equal(ours, theirs)
+
 
 def polygon_ranges(character: Character) -> list[tuple[bpy.types.Object, slice]]:
     """Each object with its polygons' place in the character's numbering."""
@@ -81,6 +108,16 @@ def vertex_ranges(character: Character) -> list[tuple[bpy.types.Object, slice]]:
     return _ranges(character, "vertices")
 
 
+def places(character: Character, of: str) -> FloatArray:
+    """(k, 3) the character's own "vertices", or the centres of its "polygons", as modelled, in world space."""
+    found = []
+    for obj in character.objects:
+        points = _get(getattr(obj.data, of), {"vertices": "co", "polygons": "center"}[of], 3, np.float32).reshape(-1, 3)
+        world = np.array(obj.matrix_world)
+        found.append(points @ world[:3, :3].T + world[:3, 3])
+    return np.concatenate(found)
+
+
 def _ranges(character: Character, of: str) -> list[tuple[bpy.types.Object, slice]]:
     ends = np.cumsum([len(getattr(obj.data, of)) for obj in character.objects]).tolist()
     starts = [0, *ends[:-1]]
@@ -89,7 +126,9 @@ def _ranges(character: Character, of: str) -> list[tuple[bpy.types.Object, slice
 
 def read_objects(context: bpy.types.Context, characters: Sequence[Character]) -> list[Pose]:
     """Each character as it is now, one pose each."""
-    return [with_rest(context, [read_pose(context, character, character.name)])[0] for character in characters]
+    return in_one_cut(
+        [with_rest(context, [read_pose(context, character, character.name)])[0] for character in characters]
+    )
 
 
 def read_frames(context: bpy.types.Context, character: Character, frames: Sequence[int]) -> list[Pose]:
@@ -154,8 +193,18 @@ def own_frames(scene: bpy.types.Scene, character: Character, count: int) -> list
     return np.unique(middles.round().astype(int)).tolist()
 
 
+def in_one_cut(poses: Sequence[Pose]) -> list[Pose]:
+    """Poses, those that are of the same polygons with the same triangles."""
+    cut: list[Pose] = []
+    for pose in poses:
+        like = (pose.cut_as(other) for other in cut)
+        cut.append(next((found for found, other in zip(like, cut, strict=True) if found.is_mesh_of(other)), pose))
+    return cut
+
+
 def with_rest(context: bpy.types.Context, poses: list[Pose]) -> list[Pose]:
-    """Poses of one character together with its rest position, where its armature has one of the same triangles."""
+    """Poses of one character together with its rest position, where its armature has one of the same polygons."""
+    poses = in_one_cut(poses)
     character = poses[0].character
     armatures = dict.fromkeys(obj.data for obj in map(armature_of, character.objects) if obj is not None)
     if not armatures:
@@ -164,12 +213,12 @@ def with_rest(context: bpy.types.Context, poses: list[Pose]) -> list[Pose]:
     try:
         for armature in armatures:
             armature.pose_position = "REST"
-        rest = read_pose(context, character, f"{character.name}, rest position")
+        rest = read_pose(context, character, f"{character.name}, rest position").cut_as(poses[0])
     finally:
         for armature, position in before.items():
             armature.pose_position = position
         context.view_layer.update()
-    return [replace(pose, rest=rest.mesh) if pose.is_mesh_of(rest) else pose for pose in poses]
+    return [replace(pose, rest=rest.mesh, axes=rest.axes) if pose.is_mesh_of(rest) else pose for pose in poses]
 
 
 def read_pose(context: bpy.types.Context, character: Character, name: str) -> Pose:
@@ -198,6 +247,7 @@ def read_pose(context: bpy.types.Context, character: Character, name: str) -> Po
             owners.append(np.where(polygon_of < 0, -1, polygon_of + polygons.start))
             own.append(np.where(vertex_of < 0, -1, vertex_of + its.start))
             n_vertices += len(points)
+        axes = _axes(character, depsgraph)
     faces, polygon_of = np.concatenate(triangles), np.concatenate(owners)
     proper = ~repeats_a_vertex(faces)
     if not (proper.any() and (polygon_of >= 0).any()):
@@ -209,7 +259,18 @@ def read_pose(context: bpy.types.Context, character: Character, name: str) -> Po
         mesh = TriangleMesh(np.concatenate(vertices), faces[proper])
     except ValueError as error:
         raise UserError(f'"{name}": {error}') from error
-    return Pose(name, character, mesh, polygon_of[proper], np.concatenate(own))
+    return Pose(name, character, mesh, polygon_of[proper], np.concatenate(own), axes)
+
+
+def _axes(character: Character, depsgraph: bpy.types.Depsgraph) -> FloatArray:
+    """(3, 3) the axes of the character's armature, or of its largest object, as columns.
+
+    Those by which bones and vertices are named .L and .R, whichever way the character stands in the scene.
+    """
+    armatures = [armature for armature in map(armature_of, character.objects) if armature is not None]
+    body = armatures[0] if armatures else max(character.objects, key=lambda obj: len(obj.data.polygons))
+    # A quaternion knows no mirroring: of a mirrored object, what is seen on the left is left.
+    return np.array(body.evaluated_get(depsgraph).matrix_world.to_quaternion().to_matrix(), dtype=np.float64)
 
 
 def _read_object(

@@ -156,7 +156,7 @@ def learn(
     described = describe(model, poses, report, progress, share=DESCRIBED)
     with report.stage("mixture"):
         try:
-            model.fit(described, lambda stage, share: progress("Learning the segments", share))
+            model.fit(described, lambda stage, share: progress("Learning the segments", share), poses[0].upright)
         except ValueError as error:
             raise UserError(f"The segments could not be learned: {error}") from error
     report.tell_of(model)
