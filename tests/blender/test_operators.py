@@ -612,6 +612,11 @@ def test_number_is_grey_where_it_is_automatic(settings, automatic):
     assert number.enabled is not automatic
 
 
+def test_sides_can_be_chosen_in_the_panel(settings):
+    shown = drawn(panel.WKS_SEGMENT_PT_main).column.return_value.prop.call_args_list
+    assert (settings, "sides") in [call.args for call in shown]
+
+
 def test_panel_breaks_long_lines_and_keeps_pairs_together(settings):
     settings.model_summary = "From Fox\nCertainty by segments: " + " · ".join(f"{i} 0.91" for i in range(2, 17))
     labels = drawn(panel.WKS_SEGMENT_PT_model).column.return_value.label.call_args_list

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wks_segment.blender import palette as module
-from wks_segment.blender.palette import MAX_COLOURS, oklab, palette
+from wks_segment.blender.palette import MAX_COLOURS, colors_of, oklab, palette, sided_palette
 
 
 def test_first_colours_do_not_depend_on_how_many_there_are(monkeypatch):
@@ -39,6 +39,36 @@ def test_no_colour_is_dark_or_grey_or_white():
     assert lab[:, 0].max() <= 0.9
     assert np.hypot(lab[:, 1], lab[:, 2]).min() >= 0.08
     assert colours.max(axis=1).min() > 0.4
+
+
+def test_parts_in_the_middle_have_the_colours_of_the_palette():
+    np.testing.assert_array_equal(sided_palette()[0], palette())
+    np.testing.assert_array_equal(
+        colors_of(np.array([5, 1005, 2005, 5 + MAX_COLOURS])), sided_palette()[[0, 1, 2, 0], 5]
+    )
+
+
+@pytest.mark.parametrize(("count", "least"), [(8, 0.1), (12, 0.07), (20, 0.05), (MAX_COLOURS, 0.025)])
+def test_no_two_parts_have_close_colours(count, least):
+    lab = oklab(sided_palette()[:, :count].reshape(-1, 3))
+    distance = np.linalg.norm(lab[:, None] - lab[None], axis=2)
+    assert distance[np.triu_indices(len(lab), 1)].min() > least
+
+
+def test_left_is_light_and_right_is_dark_and_both_are_of_about_one_hue():
+    middle, left, right = oklab(sided_palette())
+    assert left[:, 0].min() > right[:, 0].max() + 0.05
+    assert np.linalg.norm(left - right, axis=1).min() > 0.11
+    hues = np.arctan2(*np.moveaxis(np.stack([middle, left, right])[..., [2, 1]], -1, 0))
+    away = np.abs((hues[1:] - hues[0] + np.pi) % (2 * np.pi) - np.pi)
+    assert away.max() < np.radians(36)
+
+
+def test_no_part_is_black_or_grey_or_white():
+    lab = oklab(sided_palette())
+    assert 0.43 < lab[..., 0].min() < lab[..., 0].max() < 0.93
+    assert np.hypot(lab[..., 1], lab[..., 2]).min() > 0.055
+    assert sided_palette().max(axis=2).min() > 0.3
 
 
 def test_oklab_of_known_colours():

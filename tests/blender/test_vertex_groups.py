@@ -162,7 +162,7 @@ def test_only_segments_that_occur_get_a_group():
     mesh = limbed().data
     weights = np.zeros((len(mesh.vertices), 9))
     weights[:5, 2], weights[5:, 7] = 1, 0.5
-    write_labels(mesh, np.zeros(len(mesh.polygons), dtype=int), weights=weights)
+    write_labels(mesh, np.zeros(len(mesh.polygons), dtype=int), weights=dict(enumerate(weights.T)))
     obj = bpy.data.objects["Limbed"]
     assert obj.vertex_groups.keys() == ["WKS Segment 3", "WKS Segment 8"]
     np.testing.assert_array_equal(weights_of(obj), weights[:, [2, 7]])
@@ -170,15 +170,15 @@ def test_only_segments_that_occur_get_a_group():
 
 def test_modifier_that_uses_a_group_of_ours_sees_new_weights_at_once():
     obj = limbed()
-    everywhere = np.ones((642, 1))
-    write_labels(obj.data, np.zeros(1280, dtype=int), weights=everywhere)
+    everywhere = np.ones(642)
+    write_labels(obj.data, np.zeros(1280, dtype=int), weights={0: everywhere})
     obj.modifiers.new("Mask", "MASK").vertex_group = "WKS Segment 1"
 
     def shown():
         return len(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices)
 
     assert shown() == 642
-    write_labels(obj.data, np.zeros(1280, dtype=int), weights=everywhere * (np.arange(642) < 600)[:, None])
+    write_labels(obj.data, np.zeros(1280, dtype=int), weights={0: everywhere * (np.arange(642) < 600)})
     assert shown() == 600
 
 

@@ -13,7 +13,7 @@ import bpy
 
 from ..core import PoseSegmentation
 from ..core.description import Progress
-from . import demo, files, tasks
+from . import demo, files, parts, tasks
 from . import poses as reader
 from .characters import Character, armature_of, group, mesh_objects
 from .errors import UserError
@@ -39,7 +39,7 @@ OPTIONS = {
     "--preset": "preset",
 }
 """Options that are settings: their text, limits and defaults come from the property group."""
-OUTPUT_OPTIONS = {"--vertex-groups": "vertex_groups", "--snap-to": "snap_to"}
+OUTPUT_OPTIONS = {"--vertex-groups": "vertex_groups", "--snap-to": "snap_to", "--sides": "sides"}
 """The same for commands that write labels."""
 AUTOMATIC = {"n_segments": "auto_segments"}
 """Numbers that can be left open by the word "auto", and the settings that do it."""
@@ -339,7 +339,7 @@ def _label(
 ) -> None:  # fmt: skip
     labels = tasks.label(model, poses, described, settings, report, progress)
     if options.output:
-        soft = tasks.soften(model, poses, described, settings, report, progress)
+        soft = tasks.soften(model, poses, described, labels, settings, report, progress)
         tasks.write(labels, settings, report, soft)
     if options.render:
         with report.stage("render"):
@@ -377,6 +377,7 @@ def _result(options: argparse.Namespace, report: Report) -> dict[str, Any]:
             for pose, laplacian in zip(report.poses, report.laplacians, strict=True)
         ],
         "segments": report.n_segments,
+        **({"parts": report.parts} if report.parts else {}),
         **({} if report.certainty is None else {"certainty": report.certainty}),
         "notes": report.notes,
         "seconds": {name: round(seconds, 3) for name, seconds in report.seconds.items()},
@@ -395,7 +396,8 @@ def _text(result: dict[str, Any]) -> str:
         for pose in result["poses"]
     ]
     stages = [[name, f"{seconds:.1f}"] for name, seconds in result["seconds"].items()]
-    lines = [table(header, rows), "", table(["stage", "seconds"], stages), "", f"{result['segments']} segments"]
+    found = parts.counted(result["segments"], len(result.get("parts", {})))
+    lines = [table(header, rows), "", table(["stage", "seconds"], stages), "", found]
     if with_agreement:
         lines.append(f"agreement of unseen poses: {result['agreement']:.3f} of the area has the learned label")
     lines += result["notes"]

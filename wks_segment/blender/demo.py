@@ -70,8 +70,11 @@ def run(
     tasks.check_limits(settings.new_model(), poses, settings)
     model, described = tasks.learn(training, settings, report, lambda stage, done: progress(stage, 0.5 * done))
     together = tasks.label(model, training, described, settings, report, lambda stage, done: progress(stage, 0.5))
-    soft = tasks.soften(model, training, described, settings, report, lambda stage, done: progress(stage, 0.5))
+    soft = tasks.soften(
+        model, training, described, together, settings, report, lambda stage, done: progress(stage, 0.5)
+    )
     tasks.write(together, settings, report, soft)
+    written = report.n_segments, report.parts
 
     def later(stage: str, done: float) -> None:
         progress(stage, 0.5 + 0.4 * done)
@@ -81,6 +84,7 @@ def run(
         pose.name: tasks.label(model, [pose], [signature], settings, report, later)[character]
         for pose, signature in zip(training + others, described, strict=True)
     }
+    report.n_segments, report.parts = written
     own = [labels_of[pose.name] for pose in poses]
     agreement = agreements(own, learned, [polygon_areas(pose, len(own[0])) for pose in poses])
 
@@ -102,11 +106,12 @@ def run(
             for pose, known, share in zip(poses, learned, agreement, strict=True)
         ],
         "segments": report.n_segments,
+        "parts": report.parts,
         **({} if report.certainty is None else {"certainty": report.certainty}),
         "notes": report.notes,
         "seconds": {name: round(seconds, 3) for name, seconds in report.seconds.items()},
         "agreement": round(float(np.mean([a for a, known in zip(agreement, learned, strict=True) if not known])), 4),
-        "warnings": tasks.pose_warnings(poses, from_frames=True),
+        "warnings": [*report.warnings, *tasks.pose_warnings(poses, from_frames=True)],
         "files": {kind: str(path) for kind, path in paths.items()},
     }
 
@@ -124,9 +129,11 @@ def polygon_areas(pose: reader.Pose, n_polygons: int) -> FloatArray:
 
 def agreements(labels: list[IntArray], learned: list[bool], areas: list[FloatArray]) -> list[float]:
     """For each pose the share of its area whose label is the one that most learned poses give to the polygon."""
-    votes = np.zeros((len(labels[0]), 1 + max(int(of_pose.max()) for of_pose in labels)))
-    for of_pose, known in zip(labels, learned, strict=True):
+    found, columns = np.unique(np.stack(labels), return_inverse=True)
+    columns = columns.reshape(len(labels), -1)
+    votes = np.zeros((columns.shape[1], len(found)))
+    for of_pose, known in zip(columns, learned, strict=True):
         if known:
             votes[np.arange(len(of_pose)), of_pose] += 1
     usual = votes.argmax(axis=1)
-    return [float(a @ (of_pose == usual) / a.sum()) for of_pose, a in zip(labels, areas, strict=True)]
+    return [float(a @ (of_pose == usual) / a.sum()) for of_pose, a in zip(columns, areas, strict=True)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import bpy
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.mesh import FloatArray, IntArray
+from . import parts
 from .palette import colors_of, linear
 from .vertex_groups import active_group, free_name, remove_groups, write_groups
 
@@ -20,18 +22,18 @@ OWN_MATERIALS = "wks_segment_own_material"
 NOTE = "wks_segment_note"
 """Custom property of a mesh: which attributes and vertex groups are ours, and what was active before."""
 COMPONENT = "wks_segment_component"
-"""Custom property of our materials: the component that they show."""
+"""Custom property of our materials: the part that they show."""
 
 
 def write_labels(
     mesh: bpy.types.Mesh, labels: IntArray, colors: bool = True, materials: bool = False,
-    weights: FloatArray | None = None,
+    weights: Mapping[int, FloatArray] | None = None,
 ) -> None:  # fmt: skip
-    """Write (p,) components of polygons to a mesh, in the place of what an earlier run wrote.
+    """Write (p,) parts of polygons to a mesh, in the place of what an earlier run wrote.
 
     Faces and vertices get an int attribute each; optionally a color attribute of the corners, and material slots
-    behind the mesh's own, and a vertex group for each column of (n, k) weights that is not all 0. Attributes and
-    groups of the user that happen to have our names are left alone: ours get a number.
+    behind the mesh's own, and a vertex group for each part whose (n,) weights are not all 0. Attributes and groups of
+    the user that happen to have our names are left alone: ours get a number.
     """
     shown = None if weights is None else active_group(mesh)
     clear_labels(mesh)
@@ -108,9 +110,10 @@ def _at_vertices(mesh: bpy.types.Mesh, labels: IntArray) -> IntArray:
     """(n,) the label that most of the faces around each vertex have; 0 at a vertex without a face."""
     corner_vertex = np.empty(len(mesh.loops), dtype=np.int32)
     mesh.loops.foreach_get("vertex_index", corner_vertex)
-    count = np.zeros((len(mesh.vertices), int(labels.max()) + 1), dtype=np.int32)
-    np.add.at(count, (corner_vertex, _at_corners(mesh, labels)), 1)
-    return count.argmax(axis=1)
+    found, column = np.unique(labels, return_inverse=True)
+    count = np.zeros((len(mesh.vertices), len(found)), dtype=np.int32)
+    np.add.at(count, (corner_vertex, _at_corners(mesh, column.ravel())), 1)
+    return np.where(count.any(axis=1), found[count.argmax(axis=1)], 0)
 
 
 def _at_corners(mesh: bpy.types.Mesh, labels: IntArray) -> IntArray:
@@ -132,21 +135,21 @@ def _write_colors(mesh: bpy.types.Mesh, labels: IntArray) -> None:
 
 def _write_materials(mesh: bpy.types.Mesh, labels: IntArray) -> None:
     slot = np.zeros(int(labels.max()) + 1, dtype=np.int32)
-    for component in np.unique(labels).tolist():
-        slot[component] = len(mesh.materials)
-        mesh.materials.append(_material(component))
+    for part in parts.among(labels):
+        slot[part] = len(mesh.materials)
+        mesh.materials.append(_material(part))
     mesh[NOTE]["last_slot"] = len(mesh.materials)
     mesh.polygons.foreach_set("material_index", slot[labels])
 
 
-def _material(component: int) -> bpy.types.Material:
-    """The material of a component, one for all meshes."""
+def _material(part: int) -> bpy.types.Material:
+    """The material of a part, one for all meshes."""
     for material in bpy.data.materials:
-        if material.get(COMPONENT) == component and material.library is None:
+        if material.get(COMPONENT) == part and material.library is None:
             return material
-    material = bpy.data.materials.new(f"Segment {component + 1}")
-    material[COMPONENT] = component
-    color = (*linear(colors_of(np.array([component]))[0]).tolist(), 1.0)
+    material = bpy.data.materials.new(parts.name_of(part))
+    material[COMPONENT] = part
+    color = (*linear(colors_of(np.array([part]))[0]).tolist(), 1.0)
     material.diffuse_color = color
     if bpy.app.version < (5, 0, 0):  # from then on always true, and touching it warns
         material.use_nodes = True

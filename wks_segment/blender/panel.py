@@ -58,7 +58,7 @@ class WKS_SEGMENT_PT_main(_Sidebar, bpy.types.Panel):
             if settings.use_frame_range:
                 self.settings(context, "frame_first", "frame_last")
         self.segments(context)
-        self.settings(context, "n_eigenpairs", "n_energies", "covariance_type", "random_state")
+        self.settings(context, "sides", "n_eigenpairs", "n_energies", "covariance_type", "random_state")
 
         column = self.layout.column(align=True)
         column.scale_y = 1.4

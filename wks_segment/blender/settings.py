@@ -61,6 +61,21 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         description="As many segments as the poses show surely, up to 16",
         default=False,
     )
+    sides: EnumProperty(
+        name="Sides",
+        description="Whether a part that is there on both sides, as a hand, is one part or two. Left is where X points "
+        "to when the character is at rest",
+        items=[
+            ("one", "One Part for Both", "Both sides have the same number, name and color"),
+            (
+                "two",
+                "Left and Right",
+                "Names end in .L and .R, left is the lighter color. The number is 1000 more on the left and 2000 more "
+                "on the right. Not with the method of the paper",
+            ),
+        ],
+        default="one",
+    )
     random_state: IntProperty(
         name="Seed",
         description="Where the paper's setting begins its search. Otherwise nothing depends on luck, nor on this",

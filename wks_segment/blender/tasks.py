@@ -17,6 +17,7 @@ from ..core.description import Progress
 from ..core.memory import available_memory
 from ..core.mesh import FloatArray, IntArray
 from ..core.segmentation import DESCRIBED
+from . import parts
 from . import poses as reader
 from .certainty import certainties, certainty_lines
 from .characters import Character, armature_of, group, mesh_objects
@@ -25,7 +26,10 @@ from .labels import write_labels
 from .marks import marked_pairs
 from .poses import Pose
 from .settings import WKSSegmentSettings
-from .weights import hard_weights, soft_weights
+from .weights import by_parts, hard_weights, soft_weights
+
+VOTERS = 5
+"""Poses of a mesh that say which of its parts are left and right; more would not say it more surely."""
 
 
 @dataclass
@@ -35,6 +39,7 @@ class Report:
     poses: list[Pose]
     laplacians: list[str] = field(default_factory=list)
     n_segments: int = 0
+    parts: dict[str, int] = field(default_factory=dict)
     certainty: dict[int, float] | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
@@ -44,6 +49,10 @@ class Report:
         """Say how many segments a fitted model has, and how certain it is of each number."""
         self.n_segments, self.certainty = model.n_segments_, certainties(model)
         self.notes = certainty_lines(model)
+
+    def warn(self, text: str) -> None:
+        """Warn of something, once."""
+        self.warnings = list(dict.fromkeys([*self.warnings, text]))
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -58,7 +67,7 @@ class Report:
         return [
             f"{len(self.poses)} pose" + "s" * (len(self.poses) != 1),
             f"{sum(pose.mesh.n_vertices for pose in self.poses):,} vertices",
-            f"{self.n_segments} segments",
+            parts.counted(self.n_segments, len(self.parts)),
             *([f"better triangles for {improved}"] if (improved := self.laplacians.count("delaunay")) else []),
             f"{sum(self.seconds.values()):.1f} seconds",
         ]
@@ -204,7 +213,7 @@ def label(
     model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[PoseSignature],
     settings: WKSSegmentSettings, report: Report, progress: Progress,
 ) -> dict[Character, IntArray]:  # fmt: skip
-    """Components of each character's polygons, agreed on by all of its poses, and by all objects that share a mesh."""
+    """Part of each of a character's polygons, agreed on by all of its poses, and by all objects that share a mesh."""
     labels: dict[Character, IntArray] = {}
     min_share = None if model.preset == "paper" else settings.min_share / 100
     with report.stage("label"):
@@ -217,25 +226,55 @@ def label(
                 lambda share, name=name: progress(f'Labels of "{name}"', 1.0),
                 marked=marked_pairs(poses[mine[0]].character, settings.snap_to),
             )
+            if settings.sides == "two":
+                voters = [mine[i] for i in reader.evenly(0, len(mine) - 1, VOTERS)]
+                sides = agreed_sides(model, [poses[i] for i in voters], [described[i] for i in voters], found, progress)
+                found = parts.numbered(found, sides)
             found = filled(found, poses[mine[0]].character)
             labels |= {poses[i].character: found for i in mine}
-    report.n_segments = len(np.unique(np.concatenate(list(labels.values()))))
+    occurring = parts.among(np.concatenate(list(labels.values())))
+    report.n_segments = len(np.unique(parts.segments_of(np.array(occurring))))
+    report.parts = {parts.name_of(part): part for part in occurring}
+    if settings.sides == "two" and len(occurring) == report.n_segments:
+        report.warn(
+            "Left and right are not told apart with the method of the paper: parts are one for both sides"
+            if model.regions_ is None
+            else "No segment has parts on both sides: does X point to the character's left when it is at rest?"
+        )
     return labels
+
+
+def agreed_sides(
+    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[PoseSignature], segments: IntArray,
+    progress: Progress,
+) -> IntArray:  # fmt: skip
+    """(p,) side that most poses of a mesh give to each polygon: 1 left, −1 right, 0 neither; given the segments."""
+    given = []
+    for pose, of_pose in zip(poses, described, strict=True):
+        progress(f'Left and right of "{pose.name}"', 1.0)
+        given.append(model.polygon_sides(of_pose, pose.polygon_of, segments))
+    # Half left and half neither is neither.
+    return np.trunc(np.median(given, axis=0)).astype(np.int64)
 
 
 def soften(
     model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[PoseSignature],
-    settings: WKSSegmentSettings, report: Report, progress: Progress,
-) -> dict[Character, FloatArray] | None:  # fmt: skip
-    """Weights of each character's vertices, agreed on as labels are; None if the settings ask for no soft groups."""
+    labels: dict[Character, IntArray], settings: WKSSegmentSettings, report: Report, progress: Progress,
+) -> dict[Character, dict[int, FloatArray]] | None:  # fmt: skip
+    """For each part the weights of each character's vertices, agreed on as labels are.
+
+    None if the settings ask for no soft groups.
+    """
     if settings.vertex_groups != "soft":
         return None
-    weights: dict[Character, FloatArray] = {}
+    weights: dict[Character, dict[int, FloatArray]] = {}
     with report.stage("label"):
         for mine in of_one_mesh(poses):
-            progress(f'Weights of "{poses[mine[0]].character.name}"', 1.0)
+            character = poses[mine[0]].character
+            progress(f'Weights of "{character.name}"', 1.0)
             found = soft_weights(model, [poses[i] for i in mine], [described[i] for i in mine])
-            weights |= {poses[i].character: found for i in mine}
+            of_parts = by_parts(found, labels[character], character)
+            weights |= {poses[i].character: of_parts for i in mine}
     return weights
 
 
@@ -247,7 +286,7 @@ def of_one_mesh(poses: Sequence[Pose]) -> list[list[int]]:
 
 def write(
     labels: dict[Character, IntArray], settings: WKSSegmentSettings, report: Report,
-    soft: dict[Character, FloatArray] | None = None,
+    soft: dict[Character, dict[int, FloatArray]] | None = None,
 ) -> None:  # fmt: skip
     """Write labels, and the weights that `soften` gave, to the objects of each character."""
     with report.stage("write"):
@@ -256,7 +295,7 @@ def write(
             for (obj, polygons), (_, vertices) in ranges:
                 if polygons.stop == polygons.start:
                     continue
-                weights = None if soft is None else soft[character][vertices]
+                weights = None if soft is None else {part: of[vertices] for part, of in soft[character].items()}
                 if settings.vertex_groups == "hard":
                     weights = hard_weights(obj.data, values[polygons])
                 write_labels(obj.data, values[polygons], settings.write_colors, settings.write_materials, weights)
@@ -274,13 +313,7 @@ def stored_model(settings: WKSSegmentSettings) -> PoseSegmentation:
 
 def filled(labels: IntArray, character: Character) -> IntArray:
     """Labels for all polygons of a character: one that is not seen (masked out, say) takes that of the nearest one."""
-    centres = []
-    for obj in character.objects:
-        of_mesh = np.empty(3 * len(obj.data.polygons), dtype=np.float32)
-        obj.data.polygons.foreach_get("center", of_mesh)
-        world = np.array(obj.matrix_world)
-        centres.append(of_mesh.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3])
-    places = np.concatenate(centres)
+    places = reader.places(character, "polygons")
     labels = np.concatenate([labels, np.full(len(places) - len(labels), -1)])
     unseen = labels < 0
     if unseen.any():

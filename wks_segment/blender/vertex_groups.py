@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from itertools import chain, count
 from typing import Any
@@ -11,13 +11,16 @@ import bpy
 import numpy as np
 
 from ..core.mesh import FloatArray
+from . import parts
 
-NAME = "WKS Segment {}"
+NAME = "WKS {}"
 """Not the bare name of our materials: bones, attributes and vertex groups share their names."""
 
 
-def write_groups(mesh: bpy.types.Mesh, weights: FloatArray, note: Any, shown: str | None = None) -> None:
-    """Add a vertex group for each column of (n, k) weights that is not all 0, behind the mesh's own.
+def write_groups(
+    mesh: bpy.types.Mesh, weights: Mapping[int, FloatArray], note: Any, shown: str | None = None
+) -> None:  # fmt: skip
+    """Add a vertex group for each part whose (n,) weights are not all 0, behind the mesh's own.
 
     Parameters
     ----------
@@ -31,11 +34,12 @@ def write_groups(mesh: bpy.types.Mesh, weights: FloatArray, note: Any, shown: st
     with _holder(mesh) as holder:
         active = holder.vertex_groups.active
         note["active_group"] = active.name if active is not None else ""
-        components = np.flatnonzero(weights.any(axis=0)).tolist()
-        groups = [holder.vertex_groups.new(name=_free_name(holder, NAME.format(i + 1))) for i in components]
+        found = parts.among(np.array([part for part, of_part in weights.items() if of_part.any()], dtype=np.int64))
+        names = [NAME.format(parts.name_of(part)) for part in found]
+        groups = [holder.vertex_groups.new(name=_free_name(holder, name)) for name in names]
         note["vertex_groups"] = [group.name for group in groups]
-        for component, group in zip(components, groups, strict=True):
-            _fill(group, weights[:, component].astype(np.float32))
+        for part, group in zip(found, groups, strict=True):
+            _fill(group, weights[part].astype(np.float32))
         _activate(holder, shown, note["active_group"], *note["vertex_groups"])
 
 

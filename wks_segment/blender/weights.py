@@ -12,18 +12,21 @@ from scipy.spatial import cKDTree
 from ..core import PoseSegmentation, PoseSignature
 from ..core.mesh import BoolArray, FloatArray, IntArray
 from ..core.surface import indicator
+from . import parts
 from .characters import Character
-from .poses import Pose, polygon_ranges, vertex_ranges
+from .poses import Pose, places, polygon_ranges, vertex_ranges
 
 LEAST = 0.01
 """Smaller soft weights are left out: nearly every vertex would be in every group."""
 
 
-def hard_weights(mesh: bpy.types.Mesh, labels: IntArray) -> FloatArray:
-    """(n, k) 1 where a vertex is a corner of a polygon with that label, else 0, given the (p,) labels of polygons."""
+def hard_weights(mesh: bpy.types.Mesh, labels: IntArray) -> dict[int, FloatArray]:
+    """For each part (n,) 1 where a vertex is a corner of a polygon of it, else 0; given the (p,) parts of polygons."""
     vertices, polygons = _corners(mesh)
-    weights = np.zeros((len(mesh.vertices), int(labels.max()) + 1))
-    weights[vertices, labels[polygons]] = 1.0
+    of_corner = labels[polygons]
+    weights = {part: np.zeros(len(mesh.vertices)) for part in parts.among(labels)}
+    for part, of_part in weights.items():
+        of_part[vertices[of_corner == part]] = 1.0
     return weights
 
 
@@ -42,11 +45,33 @@ def soft_weights(
     weights = np.sum(means, axis=0) / np.maximum(times_seen, 1)[:, None]
     unseen = times_seen == 0
     if unseen.any():
-        places = _places(poses[0].character)
-        weights[unseen] = weights[~unseen][cKDTree(places[~unseen]).query(places[unseen])[1]]
+        place = places(poses[0].character, "vertices")
+        weights[unseen] = weights[~unseen][cKDTree(place[~unseen]).query(place[unseen])[1]]
     # Among very many segments, the largest can be small too.
     weights[(weights < LEAST) & (weights < weights.max(axis=1, keepdims=True))] = 0
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+
+
+def by_parts(weights: FloatArray, labels: IntArray, character: Character) -> dict[int, FloatArray]:
+    """Weights of parts at each of a character's n own vertices, whose sum over a segment's parts is the segment's.
+
+    Parameters
+    ----------
+    weights : (n, n_segments) array
+        Of segments.
+    labels : (p,) int array
+        Part of each of the character's polygons. A vertex has the weights of the nearest part of each segment.
+    """
+    vertices, polygons = places(character, "vertices"), places(character, "polygons")
+    result: dict[int, FloatArray] = {}
+    for segment in np.flatnonzero(weights.any(axis=0)).tolist():
+        mine = np.flatnonzero(parts.segments_of(labels) == segment)
+        found = parts.among(labels[mine]) or [segment]
+        nearest = np.full(len(vertices), found[0])
+        if len(found) > 1:
+            nearest = labels[mine[cKDTree(polygons[mine]).query(vertices)[1]]]
+        result |= {part: np.where(nearest == part, weights[:, segment], 0.0) for part in found}
+    return result
 
 
 def own_vertices(pose: Pose, values: FloatArray) -> tuple[FloatArray, BoolArray]:
@@ -93,14 +118,3 @@ def _corners(mesh: bpy.types.Mesh) -> tuple[IntArray, IntArray]:
     size = np.empty(len(mesh.polygons), dtype=np.int32)
     mesh.polygons.foreach_get("loop_total", size)
     return vertices.astype(np.int64), np.repeat(np.arange(len(size)), size)
-
-
-def _places(character: Character) -> FloatArray:
-    """(n, 3) own vertices of a character as they were modelled, in world space."""
-    places = []
-    for obj in character.objects:
-        points = np.empty(3 * len(obj.data.vertices), dtype=np.float32)
-        obj.data.vertices.foreach_get("co", points)
-        world = np.array(obj.matrix_world)
-        places.append(points.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3])
-    return np.concatenate(places)

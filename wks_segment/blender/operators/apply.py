@@ -36,7 +36,7 @@ class WKS_SEGMENT_OT_apply(feedback.AsksFirst, bpy.types.Operator):
             self.check_limits(context, model, report.poses)
             described = tasks.describe(model, report.poses, report, progress)
             labels = tasks.label(model, report.poses, described, settings, report, progress)
-            soft = tasks.soften(model, report.poses, described, settings, report, progress)
+            soft = tasks.soften(model, report.poses, described, labels, settings, report, progress)
             tasks.write(labels, settings, report, soft)
         if settings.write_colors:
             feedback.show_colors(context)

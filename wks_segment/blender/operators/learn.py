@@ -28,7 +28,7 @@ class WKS_SEGMENT_OT_learn(feedback.AsksFirst, bpy.types.Operator):
             self.check_limits(context, settings.new_model(), poses)
             model, described = tasks.learn(poses, settings, report, progress)
             labels = tasks.label(model, poses, described, settings, report, progress)
-            soft = tasks.soften(model, poses, described, settings, report, progress)
+            soft = tasks.soften(model, poses, described, labels, settings, report, progress)
             tasks.write(labels, settings, report, soft)
             report.warnings += tasks.segment_warnings(model, report)
         names = list(dict.fromkeys(pose.character.name for pose in poses))
