@@ -129,15 +129,20 @@ def test_left_is_told_at_rest_however_character_and_poses_are_turned(creature):
 
 @pytest.mark.parametrize(("scale", "left"), [((1, 1, 1), 1), ((-1, 1, 1), 2)])
 def test_left_is_what_is_seen_on_the_left_of_an_object_without_a_rig(creature, settings, scale, left):
-    statue = bpy.data.objects.new("Statue", creature.data.copy())
-    bpy.context.scene.collection.objects.link(statue)
-    statue.rotation_euler, statue.scale = (0, 0, 2.5), scale
-    for group in creature.vertex_groups:
-        statue.vertex_groups.new(name=group.name)
+    statues = []
+    for frame in (5, 20, 35, 50):
+        bpy.context.scene.frame_set(frame)
+        posed = creature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        statue = bpy.data.objects.new("Statue", bpy.data.meshes.new_from_object(posed))
+        bpy.context.scene.collection.objects.link(statue)
+        statue.rotation_euler, statue.scale = (0, 0, 2.5), scale
+        for group in creature.vertex_groups:
+            statue.vertex_groups.new(name=group.name)
+        statues.append(statue)
     settings.source = "OBJECTS"
-    select(statue)
+    select(*statues)
     OPS.learn()
-    assert sides_are_right(statue, left, 3 - left)
+    assert all(sides_are_right(statue, left, 3 - left) for statue in statues)
 
 
 def test_what_a_modifier_hides_has_the_side_of_what_is_next_to_it(creature):
@@ -319,7 +324,7 @@ def test_undo_gives_back_what_was(learned):
 
 def test_demo_measures_sides_as_well(creature, settings, tmp_path, needs_rendering):
     character = Character((creature,))
-    result = demo.run(bpy.context, character, settings, tmp_path / "walk", 2, 1, lambda stage, share: None)
+    result = demo.run(bpy.context, character, settings, tmp_path / "walk", 4, 1, lambda stage, share: None)
     assert (result["segments"], len(result["parts"])) == (5, len(np.unique(labels_of(creature))))
     assert result["agreement"] > 0.8
     assert sides_are_right(creature)

@@ -113,8 +113,25 @@ def test_what_was_not_learned_is_numbered_on(model):
 
 def test_sides_need_one_of_the_same_segment_opposite():
     centres = np.array([(1, 0, 0), (-1, 0.1, 0), (0.01, 0, 1), (0.9, 0, -2), (-0.9, 0, -2), (2, 0, 3)])
-    assert sides(centres, np.array([0, 0, 1, 2, 2, 3])).tolist() == [1, -1, 0, 1, -1, 0]
-    assert sides(centres, np.array([0, 1, 1, 2, 2, 3])).tolist() == [0, 0, 0, 1, -1, 0]
+    none = np.arange(6)
+    assert sides(centres, np.array([0, 0, 1, 2, 2, 3]), none).tolist() == [1, -1, 0, 1, -1, 0]
+    assert sides(centres, np.array([0, 1, 1, 2, 2, 3]), none).tolist() == [0, 0, 0, 1, -1, 0]
+
+
+def test_bent_sides_are_told_from_which_is_which_in_the_mirror_image():
+    """Four limbs of one segment that have swung to and fro: mirroring brings none to the one opposite."""
+    centres = np.array([(0.5, 1, 0), (-0.1, 0, 0), (0.4, -2, 0), (-0.2, -1, 0), (0.0, 9, 0)])
+    segment = np.zeros(5, dtype=int)
+    assert sides(centres, segment, np.arange(5)).tolist() != [1, -1, 1, -1, 0]
+    assert sides(centres, segment, np.array([1, 0, 3, 2, 5])).tolist() == [1, -1, 1, -1, 0]
+
+
+def test_left_is_told_from_a_bent_pose_alone():
+    poses = [figure(0.7, -0.2), figure(0.2, 0.4)]
+    model = PoseSegmentation(6, n_eigenpairs=100, n_energies=60).fit(poses)
+    regions = model.segment_regions(poses[0])
+    for limbs, side in (("left arm", "left leg"), 1), (("right arm", "right leg"), -1):
+        assert {int(model.regions_.side[name_of(regions, limb(one))]) for one in limbs} == {side}
 
 
 def test_in_poses_of_one_mesh_the_order_says_which_region_is_which(model):

@@ -74,7 +74,7 @@ def run(
         model, training, described, together, settings, report, lambda stage, done: progress(stage, 0.5)
     )
     tasks.write(together, settings, report, soft)
-    written = report.n_segments, report.parts
+    counted = report.n_segments, report.parts
 
     def later(stage: str, done: float) -> None:
         progress(stage, 0.5 + 0.4 * done)
@@ -84,7 +84,7 @@ def run(
         pose.name: tasks.label(model, [pose], [signature], settings, report, later)[character]
         for pose, signature in zip(training + others, described, strict=True)
     }
-    report.n_segments, report.parts = written
+    report.n_segments, report.parts = counted
     own = [labels_of[pose.name] for pose in poses]
     agreement = agreements(own, learned, [polygon_areas(pose, len(own[0])) for pose in poses])
 

@@ -11,7 +11,7 @@ keeps a map from turning left into right. Here there is no map, only a few numbe
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -185,7 +185,7 @@ class RegionAtlas:
 
         `alike`: the poses are of one mesh, and have their regions in the same order.
         """
-        side = sides(centres, poses[0].segment)
+        side = np.zeros(len(centres), dtype=np.int64)
         atlas = cls(n_groups, poses[0], side, _scaled(NOISE, poses[0]))
         # A mean over poses finds regions of each more surely than the first pose does.
         for _ in range(2):
@@ -195,7 +195,11 @@ class RegionAtlas:
             if len(poses) > 1:
                 noise = np.maximum(_spread(mean, poses, names), _scaled(LEAST_NOISE, mean))
             atlas = cls(n_groups, mean, side, noise)
-        return atlas
+        return replace(atlas, side=sides(centres, poses[0].segment, atlas.mirrored()))
+
+    def mirrored(self) -> IntArray:
+        """(r,) which region each is in the mirror image of the character; on from r for one that has none there."""
+        return self.named(replace(self.traits, handedness=-self.traits.handedness))
 
     def arrays(self) -> dict[str, FloatArray | IntArray]:
         """What a file keeps; see `of_arrays`."""
@@ -275,20 +279,33 @@ class RegionAtlas:
         return np.asarray(np.sqrt(len(placed)) * squared)
 
 
-def sides(centres: FloatArray, segment: IntArray) -> IntArray:
+def sides(centres: FloatArray, segment: IntArray, mirrored: IntArray) -> IntArray:
     """(r,) 1 for regions on the left, −1 for those on the right of which there is one of the same segment opposite.
 
-    Given (r, 3) centres of regions in units of the square root of the area, the mirror plane being x = 0.
+    Opposite is what mirroring brings close to it; else, of what is bent or turned, what is it in the mirror image.
+
+    Parameters
+    ----------
+    centres : (r, 3) array
+        Of regions in units of the square root of the area, the mirror plane being x = 0.
+    segment : (r,) int array
+    mirrored : (r,) int array
+        Which region each is in the mirror image, r or more for none of them.
     """
-    side = np.zeros(len(segment), dtype=np.int64)
     distances = cdist(centres * (-1, 1, 1), centres)
     distances[segment[:, None] != segment] = np.inf
-    opposite = distances.argmin(axis=1)
-    paired = (opposite[opposite] == np.arange(len(segment))) & (opposite != np.arange(len(segment)))
-    apart = centres[:, 0] - centres[opposite, 0]
-    paired &= (np.abs(apart) > MIDDLE) & (centres[:, 0] * centres[opposite, 0] < 0)
-    side[paired] = np.sign(apart[paired])
-    return side
+    nearest = distances.argmin(axis=1)
+    across = centres[:, 0] * centres[nearest, 0] < 0
+    side = _told_apart(centres[:, 0], nearest) * across
+    opposite = np.where(mirrored < len(segment), mirrored, np.arange(len(segment)))
+    neither = (side == 0) & (side[opposite] == 0)
+    return np.where(neither, _told_apart(centres[:, 0], opposite), side)
+
+
+def _told_apart(x: FloatArray, opposite: IntArray) -> IntArray:
+    """(r,) 1 or −1 where a region is clearly further left or right than the opposite one, which is opposite to it."""
+    apart = x - x[opposite]
+    return np.where((opposite[opposite] == np.arange(len(x))) & (np.abs(apart) > MIDDLE), np.sign(apart), 0).astype(int)
 
 
 def side_field(surface: Surface, region: IntArray, side: IntArray) -> FloatArray:
