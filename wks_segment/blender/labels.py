@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from ..core.mesh import FloatArray, IntArray
 from . import parts
-from .palette import colors_of, linear
+from .palette import linear
+from .style import PLAIN, Style
 from .vertex_groups import active_group, free_name, remove_groups, write_groups
 
 FACES = "wks_segment"
@@ -27,7 +28,7 @@ COMPONENT = "wks_segment_component"
 
 def write_labels(
     mesh: bpy.types.Mesh, labels: IntArray, colors: bool = True, materials: bool = False,
-    weights: Mapping[int, FloatArray] | None = None,
+    weights: Mapping[int, FloatArray] | None = None, style: Style = PLAIN,
 ) -> None:  # fmt: skip
     """Write (p,) parts of polygons to a mesh, in the place of what an earlier run wrote.
 
@@ -44,16 +45,16 @@ def write_labels(
     if colors:
         active = mesh.color_attributes.active_color
         mesh[NOTE]["active_color"] = active.name if active is not None else ""
-        _write_colors(mesh, labels)
+        _write_colors(mesh, labels, style)
     if materials:
         mesh[NOTE]["had_material_index"] = "material_index" in mesh.attributes
         mesh[NOTE]["first_slot"] = len(mesh.materials)
         before = np.empty(len(mesh.polygons), dtype=np.int32)
         mesh.polygons.foreach_get("material_index", before)
         _write_ints(mesh, "own_materials", OWN_MATERIALS, "FACE", before)
-        _write_materials(mesh, labels)
+        _write_materials(mesh, labels, style)
     if weights is not None:
-        write_groups(mesh, weights, mesh[NOTE], shown)
+        write_groups(mesh, weights, mesh[NOTE], style, shown)
     mesh.update()
 
 
@@ -122,34 +123,34 @@ def _at_corners(mesh: bpy.types.Mesh, labels: IntArray) -> IntArray:
     return np.repeat(labels, corners)
 
 
-def _write_colors(mesh: bpy.types.Mesh, labels: IntArray) -> None:
+def _write_colors(mesh: bpy.types.Mesh, labels: IntArray, style: Style) -> None:
     # Corners, since colors of the FACE domain cannot be shown, and those of points would blend.
     attribute = mesh.color_attributes.new(free_name(mesh, COLORS), "BYTE_COLOR", "CORNER")
     mesh[NOTE]["colors"] = attribute.name
     colors = np.ones((len(mesh.loops), 4), dtype=np.float32)
-    colors[:, :3] = colors_of(_at_corners(mesh, labels))
+    colors[:, :3] = style.colors_of(_at_corners(mesh, labels))
     attribute.data.foreach_set("color_srgb", colors.ravel())
     # What is rendered stays the user's: only what is shown in solid view changes.
     mesh.color_attributes.active_color = attribute
 
 
-def _write_materials(mesh: bpy.types.Mesh, labels: IntArray) -> None:
+def _write_materials(mesh: bpy.types.Mesh, labels: IntArray, style: Style) -> None:
     slot = np.zeros(int(labels.max()) + 1, dtype=np.int32)
     for part in parts.among(labels):
         slot[part] = len(mesh.materials)
-        mesh.materials.append(_material(part))
+        mesh.materials.append(_material(part, style))
     mesh[NOTE]["last_slot"] = len(mesh.materials)
     mesh.polygons.foreach_set("material_index", slot[labels])
 
 
-def _material(part: int) -> bpy.types.Material:
+def _material(part: int, style: Style) -> bpy.types.Material:
     """The material of a part, one for all meshes."""
     for material in bpy.data.materials:
         if material.get(COMPONENT) == part and material.library is None:
             return material
-    material = bpy.data.materials.new(parts.name_of(part))
+    material = bpy.data.materials.new(style.name_of(part))
     material[COMPONENT] = part
-    color = (*linear(colors_of(np.array([part]))[0]).tolist(), 1.0)
+    color = (*linear(style.colors_of(np.array([part]))[0]).tolist(), 1.0)
     material.diffuse_color = color
     if bpy.app.version < (5, 0, 0):  # from then on always true, and touching it warns
         material.use_nodes = True

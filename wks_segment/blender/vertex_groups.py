@@ -12,13 +12,14 @@ import numpy as np
 
 from ..core.mesh import FloatArray
 from . import parts
+from .style import Style
 
 NAME = "WKS {}"
 """Not the bare name of our materials: bones, attributes and vertex groups share their names."""
 
 
 def write_groups(
-    mesh: bpy.types.Mesh, weights: Mapping[int, FloatArray], note: Any, shown: str | None = None
+    mesh: bpy.types.Mesh, weights: Mapping[int, FloatArray], note: Any, style: Style, shown: str | None = None
 ) -> None:  # fmt: skip
     """Add a vertex group for each part whose (n,) weights are not all 0, behind the mesh's own.
 
@@ -35,7 +36,7 @@ def write_groups(
         active = holder.vertex_groups.active
         note["active_group"] = active.name if active is not None else ""
         found = parts.among(np.array([part for part, of_part in weights.items() if of_part.any()], dtype=np.int64))
-        names = [NAME.format(parts.name_of(part)) for part in found]
+        names = [NAME.format(style.name_of(part)) for part in found]
         groups = [holder.vertex_groups.new(name=_free_name(holder, name)) for name in names]
         note["vertex_groups"] = [group.name for group in groups]
         for part, group in zip(found, groups, strict=True):

@@ -1,0 +1,42 @@
+"""What parts are called and how they are coloured: as the user has it, else by their number."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..core.mesh import FloatArray, IntArray
+from . import palette, parts
+
+
+@dataclass(frozen=True)
+class Style:
+    """Names and colours of parts.
+
+    Attributes
+    ----------
+    names
+        By the part's number; others are called as `parts.name_of` calls them.
+    colors
+        (3,) sRGB, 0 to 1, by the part's number; others have that of the palette.
+    """
+
+    names: Mapping[int, str] = field(default_factory=dict)
+    colors: Mapping[int, FloatArray] = field(default_factory=dict)
+
+    def name_of(self, part: int) -> str:
+        """As a person reads it."""
+        return self.names.get(part) or parts.name_of(part)
+
+    def colors_of(self, numbers: IntArray) -> FloatArray:
+        """(…, 3) sRGB colour of each part, given (…) numbers."""
+        colors = palette.colors_of(numbers).copy()
+        for part, color in self.colors.items():
+            colors[np.asarray(numbers) == part] = color
+        return colors
+
+
+PLAIN = Style()
+"""Nothing renamed, nothing recoloured."""
