@@ -20,6 +20,9 @@ import bpy
 import wks_segment.blender
 from benchmarks import shapes
 from wks_segment.blender import tasks
+from wks_segment.blender.report import Report
+from wks_segment.blender.tasks import Wanted
+from wks_segment.blender.training import read_training_poses
 from wks_segment.core import description
 
 
@@ -59,7 +62,7 @@ def run() -> dict[str, dict[str, float]]:
     """Wall and CPU seconds of each stage, from the objects to written labels."""
     settings = bpy.context.scene.wks_segment
     settings.source = "OBJECTS"
-    report = tasks.Report([])
+    report = Report([])
     stages: dict[str, dict[str, float]] = {}
 
     def timed(name: str, work: Callable[[], Any]) -> Any:
@@ -72,11 +75,12 @@ def run() -> dict[str, dict[str, float]]:
         pass
 
     model = settings.new_model()
-    poses = timed("read", lambda: tasks.read_training_poses(bpy.context, settings, report))
+    poses = timed("read", lambda: read_training_poses(bpy.context, settings, report))
     described = timed("connect, eigenpairs, signature", lambda: tasks.describe(model, poses, report, quiet))
     timed("mixture", lambda: model.fit(described))
-    labels = timed("label", lambda: tasks.label(model, poses, described, settings, report, quiet))
-    timed("write", lambda: tasks.write(labels, settings, report))
+    wanted = timed("read meshes", lambda: Wanted.of(settings, (pose.character for pose in poses)))
+    labels = timed("label", lambda: tasks.label(model, poses, described, wanted, report, quiet))
+    timed("write", lambda: tasks.write(labels, wanted, report))
     return stages
 
 

@@ -19,8 +19,10 @@ from builders import (
 
 from wks_segment.blender import poses as reader
 from wks_segment.blender import tasks
+from wks_segment.blender.bodies import Body
 from wks_segment.blender.characters import Character
 from wks_segment.blender.labels import clear_labels, write_labels
+from wks_segment.blender.report import Report
 from wks_segment.blender.weights import LEAST, own_vertices, soft_weights
 from wks_segment.core import PoseSegmentation, TriangleMesh
 
@@ -117,7 +119,7 @@ def test_soft_weights_are_the_mean_over_the_poses(settings, rigged):
     character = Character((rigged,))
     frames = reader.own_frames(bpy.context.scene, character, 3)
     poses = reader.read_frames(bpy.context, character, frames)
-    described = tasks.describe(model, poses, tasks.Report([]), lambda stage, share: None)
+    described = tasks.describe(model, poses, Report([]), lambda stage, share: None)
     each = [model.predict_soft(of_pose) for of_pose in described]
     components = [int(name.split()[-1]) - 1 for name in ours(rigged)]
 
@@ -141,7 +143,7 @@ def test_smoothness_reaches_the_soft_weights(settings):
         steps.append(np.abs(weights[edges[:, 0]] - weights[edges[:, 1]]).sum())
         if smoothness == 0:
             pose, model = read(obj), tasks.stored_model(settings)
-            (signature,) = tasks.describe(model, [pose], tasks.Report([]), lambda stage, share: None)
+            (signature,) = tasks.describe(model, [pose], Report([]), lambda stage, share: None)
             plain = model.predict_proba(signature)
             np.testing.assert_allclose(weights[plain >= 0.99], plain[plain >= 0.99], atol=0.011)
             np.testing.assert_array_equal(weights > 0, plain >= LEAST)
@@ -273,8 +275,9 @@ def test_soft_weights_through_modifiers_that_make_faces(settings, kind, options)
 def test_the_way_over_polygons_comes_close_to_that_over_vertices():
     model, pose = fitted(limbed())
     described = [model.describe(pose.mesh)]
-    exact = soft_weights(model, [pose], described)
-    over_polygons = soft_weights(model, [replace(pose, vertex_of=np.full(642, -1))], described)
+    body = Body.of(pose.character)
+    exact = soft_weights(model, [pose], described, body)
+    over_polygons = soft_weights(model, [replace(pose, vertex_of=np.full(642, -1))], described, body)
     assert np.abs(exact - over_polygons).max() > 1e-3, "it is the same way"
     assert np.abs(exact - over_polygons).mean() < 0.05
     assert (exact.argmax(axis=1) == over_polygons.argmax(axis=1)).mean() > 0.95
@@ -287,7 +290,7 @@ def test_vertex_gets_the_mean_over_its_polygons_by_area():
     split = TriangleMesh(pose.mesh.vertices[pose.mesh.faces.ravel()], np.arange(6).reshape(2, 3))
     apart = replace(pose, mesh=split, vertex_of=np.full(6, -1))
     values = np.repeat(np.where(pose.polygon_of == 0, 0.0, 4.0), 3)[:, None]
-    own, seen = own_vertices(apart, values)
+    own, seen = own_vertices(apart, values, Body.of(pose.character))
     np.testing.assert_allclose(own[:, 0], [3, 3, 0, 4, 0])
     np.testing.assert_array_equal(seen, [True, True, True, True, False])
 

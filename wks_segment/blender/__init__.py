@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 
 from . import command, operators, panel
+from .jobs import HOLDER, Desk
 from .settings import WKSSegmentSettings
 
 CLASSES = (WKSSegmentSettings, *operators.CLASSES, *panel.CLASSES)
@@ -21,12 +22,15 @@ def register() -> None:
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.Scene.wks_segment = bpy.props.PointerProperty(type=WKSSegmentSettings)
+    setattr(bpy.types.WindowManager, HOLDER, Desk())
     _commands.append(bpy.utils.register_cli_command(COMMAND, command.run))
 
 
 def unregister() -> None:
     """Called by Blender when the extension is disabled."""
     bpy.utils.unregister_cli_command(_commands.pop())
+    getattr(bpy.types.WindowManager, HOLDER).close()
+    delattr(bpy.types.WindowManager, HOLDER)
     del bpy.types.Scene.wks_segment
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -17,16 +17,63 @@ CONVERTIBLE = {
 
 
 @dataclass(frozen=True)
-class Character:
-    """One or several mesh objects that are one body, in the order of their names."""
+class Member:
+    """How an object is found again, and its mesh told from another: by numbers that last as long as Blender runs."""
 
-    objects: tuple[bpy.types.Object, ...]
+    name: str
+    uid: int
+    mesh_uid: int
+
+    def found(self) -> bpy.types.Object | None:
+        """The object, under whatever name; None if it is gone, or is no mesh any more."""
+        obj = bpy.data.objects.get(self.name)
+        if obj is None or obj.session_uid != self.uid:
+            obj = next((other for other in bpy.data.objects if other.session_uid == self.uid), None)
+        return obj if obj is not None and obj.type == "MESH" else None
+
+
+@dataclass(frozen=True, init=False)
+class Character:
+    """One or several mesh objects that are one body, in the order of their names.
+
+    Holds on to nothing of Blender's, and so can be handed to a thread: what is there is looked up each time.
+
+    Attributes
+    ----------
+    name : str
+        Of the object, or of the armature that holds several together.
+    members
+        What the objects are found by.
+    """
+
+    name: str
+    members: tuple[Member, ...]
+
+    def __init__(self, objects: Sequence[bpy.types.Object]) -> None:
+        armature = armature_of(objects[0])
+        members = tuple(Member(obj.name, obj.session_uid, obj.data.session_uid) for obj in objects)
+        object.__setattr__(self, "name", objects[0].name if len(objects) == 1 or armature is None else armature.name)
+        object.__setattr__(self, "members", members)
 
     @property
-    def name(self) -> str:
-        """Name of the object, or of the armature that holds several together."""
-        armature = armature_of(self.objects[0])
-        return self.objects[0].name if len(self.objects) == 1 or armature is None else armature.name
+    def objects(self) -> tuple[bpy.types.Object, ...]:
+        """The objects; not for a thread.
+
+        Raises
+        ------
+        UserError
+            If one is gone.
+        """
+        found = {member.name: member.found() for member in self.members}
+        gone = ", ".join(f'"{name}"' for name, obj in found.items() if obj is None)
+        if gone:
+            raise UserError(f"{gone} is gone")
+        return tuple(found.values())
+
+    @property
+    def meshes(self) -> tuple[int, ...]:
+        """What tells its meshes from those of another character; fit for a thread."""
+        return tuple(member.mesh_uid for member in self.members)
 
     def frame_ranges(self) -> list[tuple[float, float]]:
         """First and last frame of each action and unmuted NLA strip that moves the character now."""

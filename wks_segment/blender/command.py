@@ -19,8 +19,9 @@ from .characters import Character, armature_of, group, mesh_objects
 from .errors import UserError
 from .picture import Tile, render_poses
 from .poses import Pose
+from .report import Report, pose_warnings, segment_warnings
 from .settings import WKSSegmentSettings
-from .tasks import Report
+from .tasks import Wanted
 from .terminal import only_result_on_stdout, table, terminal_progress
 
 OPTIONS = {
@@ -200,17 +201,18 @@ def _segment(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     report = Report([])
     poses = _read(options, report)
     settings = _settings(options)
-    tasks.check_limits(settings.new_model(), poses, settings)
-    model, described = tasks.learn(poses, settings, report, progress)
+    model = settings.new_model()
+    tasks.check_limits(model, poses, settings)
+    described = tasks.learn(model, poses, report, progress)
     if options.model:
         _save(model, options.model)
     if options.output or options.render:
         _label(model, poses, described, settings, options, report, progress)
-        report.warnings += tasks.segment_warnings(model, report)
+        report.warnings += segment_warnings(model, report)
     settings.keep_model(model, report.facts)
     if options.output:
         files.save_scene(options.output)
-    report.warnings += tasks.pose_warnings(poses, from_frames=options.frames is not None)
+    report.warnings += pose_warnings(poses, from_frames=options.frames is not None)
     return _result(options, report)
 
 
@@ -337,10 +339,14 @@ def _label(
     model: PoseSegmentation, poses: list[Pose], described: list[Any], settings: WKSSegmentSettings,
     options: argparse.Namespace, report: Report, progress: Progress,
 ) -> None:  # fmt: skip
-    labels = tasks.label(model, poses, described, settings, report, progress)
+    def at_end(stage: str, share: float) -> None:
+        progress(stage, 1.0)
+
+    wanted = Wanted.of(settings, (pose.character for pose in poses))
+    labels = tasks.label(model, poses, described, wanted, report, at_end)
     if options.output:
-        soft = tasks.soften(model, poses, described, labels, settings, report, progress)
-        tasks.write(labels, settings, report, soft)
+        soft = tasks.soften(model, poses, described, labels, wanted, report, at_end)
+        tasks.write(labels, wanted, report, soft)
     if options.render:
         with report.stage("render"):
             render_poses([Tile(pose, labels[pose.character], pose.name) for pose in poses], options.render)

@@ -16,8 +16,9 @@ from .characters import Character
 from .creature import FIRST_FRAME, LAST_FRAME, build_creature
 from .errors import UserError
 from .picture import Tile, render_poses
+from .report import Report, pose_warnings
 from .settings import WKSSegmentSettings
-from .tasks import Report
+from .tasks import Wanted
 
 SUFFIXES = {"scene": ".blend", "picture": ".png", "model": ".json"}
 
@@ -67,13 +68,12 @@ def run(
     report.poses = poses
     training = [pose for pose, known in zip(poses, learned, strict=True) if known]
     others = [pose for pose, known in zip(poses, learned, strict=True) if not known]
-    tasks.check_limits(settings.new_model(), poses, settings)
-    model, described = tasks.learn(training, settings, report, lambda stage, done: progress(stage, 0.5 * done))
-    together = tasks.label(model, training, described, settings, report, lambda stage, done: progress(stage, 0.5))
-    soft = tasks.soften(
-        model, training, described, together, settings, report, lambda stage, done: progress(stage, 0.5)
-    )
-    tasks.write(together, settings, report, soft)
+    model, wanted = settings.new_model(), Wanted.of(settings, [character])
+    tasks.check_limits(model, poses, settings)
+    described = tasks.learn(model, training, report, lambda stage, done: progress(stage, 0.5 * done))
+    together = tasks.label(model, training, described, wanted, report, lambda stage, done: progress(stage, 0.5))
+    soft = tasks.soften(model, training, described, together, wanted, report, lambda stage, done: progress(stage, 0.5))
+    tasks.write(together, wanted, report, soft)
     counted = report.n_segments, report.parts
 
     def later(stage: str, done: float) -> None:
@@ -81,7 +81,9 @@ def run(
 
     described += tasks.describe(model, others, report, later)
     labels_of = {
-        pose.name: tasks.label(model, [pose], [signature], settings, report, later)[character]
+        pose.name: tasks.label(model, [pose], [signature], wanted, report, lambda stage, done: later(stage, 1.0))[
+            character
+        ]
         for pose, signature in zip(training + others, described, strict=True)
     }
     report.n_segments, report.parts = counted
@@ -111,7 +113,7 @@ def run(
         "notes": report.notes,
         "seconds": {name: round(seconds, 3) for name, seconds in report.seconds.items()},
         "agreement": round(float(np.mean([a for a, known in zip(agreement, learned, strict=True) if not known])), 4),
-        "warnings": [*report.warnings, *tasks.pose_warnings(poses, from_frames=True)],
+        "warnings": [*report.warnings, *pose_warnings(poses, from_frames=True)],
         "files": {kind: str(path) for kind, path in paths.items()},
     }
 

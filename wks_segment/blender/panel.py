@@ -8,6 +8,8 @@ from typing import Any
 
 import bpy
 
+from .jobs import desk_of
+
 NO_MODEL = "No model yet:\nselect a character,\nthen Learn and Segment"
 WIDTH = 36
 """Letters in a line of the sidebar, about: Blender cuts off what is longer."""
@@ -42,6 +44,18 @@ class _Sidebar:
         number.prop(settings, "n_segments")
         row.prop(settings, "auto_segments", toggle=True)
 
+    def job(self, context: bpy.types.Context) -> None:
+        """Show how far the running job is, or why the last one was ended."""
+        desk = desk_of(context)
+        stage, left = desk.job.lines if desk.job is not None else (desk.said, "")
+        column = self.layout.column(align=True)
+        for line in wrapped(stage):
+            column.label(text=line)
+        if desk.job is not None:
+            row = column.row(align=True)
+            row.progress(factor=desk.job.share, text=left)
+            row.operator("wks_segment.cancel", text="", icon="CANCEL")
+
 
 class WKS_SEGMENT_PT_main(_Sidebar, bpy.types.Panel):
     """Poses, the settings of the paper and the three buttons."""
@@ -64,6 +78,7 @@ class WKS_SEGMENT_PT_main(_Sidebar, bpy.types.Panel):
         column.scale_y = 1.4
         column.operator("wks_segment.learn", icon="MOD_EXPLODE")
         column.operator("wks_segment.apply", icon="BRUSHES_ALL")
+        self.job(context)
         self.layout.operator("wks_segment.clear", icon="X")
 
 

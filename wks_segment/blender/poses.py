@@ -108,16 +108,6 @@ def vertex_ranges(character: Character) -> list[tuple[bpy.types.Object, slice]]:
     return _ranges(character, "vertices")
 
 
-def places(character: Character, of: str) -> FloatArray:
-    """(k, 3) the character's own "vertices", or the centres of its "polygons", as modelled, in world space."""
-    found = []
-    for obj in character.objects:
-        points = _get(getattr(obj.data, of), {"vertices": "co", "polygons": "center"}[of], 3, np.float32).reshape(-1, 3)
-        world = np.array(obj.matrix_world)
-        found.append(points @ world[:3, :3].T + world[:3, 3])
-    return np.concatenate(found)
-
-
 def _ranges(character: Character, of: str) -> list[tuple[bpy.types.Object, slice]]:
     ends = np.cumsum([len(getattr(obj.data, of)) for obj in character.objects]).tolist()
     starts = [0, *ends[:-1]]

@@ -1,30 +1,30 @@
-"""What the operators and the command line do, without either: read, hand arrays to the core, write."""
+"""What the operators and the command line do, without either, step by step: describe, learn, label, write.
+
+All but the last know no Blender, and so run in a thread as well; `Wanted` is what they need of it.
+"""
 
 from __future__ import annotations
 
-import time
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
-import bpy
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..core import Connection, PoseSegmentation, PoseSignature, SpectrumError, connect
+from ..core import Connection, PoseSegmentation, PoseSignature, SpectrumError, SpectrumWarning, connect
 from ..core.description import Progress
 from ..core.memory import available_memory
 from ..core.mesh import FloatArray, IntArray
 from ..core.segmentation import DESCRIBED
 from . import parts
 from . import poses as reader
-from .certainty import certainties, certainty_lines
-from .characters import Character, armature_of, group, mesh_objects
+from .bodies import Body
+from .characters import Character
 from .errors import TooLargeError, UserError
 from .labels import write_labels
-from .marks import marked_pairs
 from .poses import Pose
+from .report import Report
 from .settings import WKSSegmentSettings
 from .weights import by_parts, hard_weights, soft_weights
 
@@ -32,103 +32,40 @@ VOTERS = 5
 """Poses of a mesh that say which of its parts are left and right; more would not say it more surely."""
 
 
-@dataclass
-class Report:
-    """What happened: for the status bar, the terminal and `--json`."""
+@dataclass(frozen=True)
+class Wanted:
+    """What the settings ask of labels, and what these are for: all that is read beside poses.
 
-    poses: list[Pose]
-    laplacians: list[str] = field(default_factory=list)
-    n_segments: int = 0
-    parts: dict[str, int] = field(default_factory=dict)
-    certainty: dict[int, float] | None = None
-    seconds: dict[str, float] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
-
-    def tell_of(self, model: PoseSegmentation) -> None:
-        """Say how many segments a fitted model has, and how certain it is of each number."""
-        self.n_segments, self.certainty = model.n_segments_, certainties(model)
-        self.notes = certainty_lines(model)
-
-    def warn(self, text: str) -> None:
-        """Warn of something, once."""
-        self.warnings = list(dict.fromkeys([*self.warnings, text]))
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """Add the time of a block to a stage."""
-        start = time.perf_counter()
-        yield
-        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
-
-    @property
-    def facts(self) -> list[str]:
-        """What a person wants to know, short."""
-        return [
-            f"{len(self.poses)} pose" + "s" * (len(self.poses) != 1),
-            f"{sum(pose.mesh.n_vertices for pose in self.poses):,} vertices",
-            parts.counted(self.n_segments, len(self.parts)),
-            *([f"better triangles for {improved}"] if (improved := self.laplacians.count("delaunay")) else []),
-            f"{sum(self.seconds.values()):.1f} seconds",
-        ]
-
-
-def read_training_poses(context: bpy.types.Context, settings: WKSSegmentSettings, report: Report) -> list[Pose]:
-    """Poses to learn from, as the settings say where they are.
-
-    Raises
-    ------
-    UserError
-        If there are none there, or they cannot be used.
+    Attributes
+    ----------
+    min_share : float
+        Smallest connected part, as a share of the area.
+    sides : "one" or "two"
+    vertex_groups : "none", "hard" or "soft"
+    colors, materials : bool
+        Whether they are written.
+    bodies
+        Of the characters that are labelled.
     """
-    characters = group(mesh_objects(context.selected_objects))
-    with report.stage("read"):
-        if settings.source == "OBJECTS":
-            poses = reader.read_objects(context, characters)
-        else:
-            character = active_character(context, characters)
-            if settings.source == "SHAPE_KEYS":
-                poses = reader.read_shape_keys(context, character, settings.pose_count)
-            else:
-                frames = chosen_frames(context.scene, character, settings)
-                poses = reader.read_frames(context, character, frames)
-    report.poses = poses
-    report.warnings += pose_warnings(poses, settings.source == "FRAMES")
-    return poses
 
+    min_share: float
+    sides: str
+    vertex_groups: str
+    colors: bool
+    materials: bool
+    bodies: dict[Character, Body]
 
-def active_character(context: bpy.types.Context, characters: Sequence[Character]) -> Character:
-    """The one among the selected characters that the active object is of, or the only one.
-
-    Raises
-    ------
-    UserError
-        If there are several and the active object is of none.
-    """
-    active = context.active_object
-    for character in characters:
-        members = (*character.objects, armature_of(character.objects[0]))
-        if len(characters) == 1 or (active is not None and active in members):
-            return character
-    names = ", ".join(character.name for character in characters[:5])
-    raise UserError(f"{len(characters)} characters are selected ({names}): click the one whose poses are meant")
-
-
-def chosen_frames(scene: bpy.types.Scene, character: Character, settings: WKSSegmentSettings) -> list[int]:
-    """Frames to take poses from: of the user's range, of the character's own animation, or of the scene's range.
-
-    Raises
-    ------
-    UserError
-        If the user's range ends before it begins.
-    """
-    if not settings.use_frame_range:
-        return reader.own_frames(scene, character, settings.pose_count)
-    if settings.frame_last < settings.frame_first:
-        raise UserError(
-            f"The frame range ends ({settings.frame_last}) before it begins ({settings.frame_first}): swap them"
+    @classmethod
+    def of(cls, settings: WKSSegmentSettings, characters: Iterable[Character]) -> Wanted:
+        """Read the settings, and the characters' own meshes."""
+        return cls(
+            settings.min_share / 100,
+            settings.sides,
+            settings.vertex_groups,
+            settings.write_colors,
+            settings.write_materials,
+            {character: Body.of(character, settings.snap_to) for character in dict.fromkeys(characters)},
         )
-    return reader.evenly(settings.frame_first, settings.frame_last, settings.pose_count)
 
 
 def check_limits(model: PoseSegmentation, poses: Sequence[Pose], settings: WKSSegmentSettings) -> None:
@@ -145,17 +82,14 @@ def check_limits(model: PoseSegmentation, poses: Sequence[Pose], settings: WKSSe
     )
 
 
-def learn(
-    poses: Sequence[Pose], settings: WKSSegmentSettings, report: Report, progress: Progress
-) -> tuple[PoseSegmentation, list[PoseSignature]]:
-    """Learn a model from poses; the model and the signature of each pose.
+def learn(model: PoseSegmentation, poses: Sequence[Pose], report: Report, progress: Progress) -> list[PoseSignature]:
+    """Fit a model to poses; the signature of each pose.
 
     Raises
     ------
     UserError
-        If the core refuses a pose or the settings; the message names it.
+        If the core refuses a pose or the model's parameters; the message names it.
     """
-    model = settings.new_model()
     most = max(int(pose.polygon_of.max()) + 1 for pose in poses)
     if model.n_segments != "auto" and model.n_segments > most:
         raise UserError(
@@ -169,7 +103,7 @@ def learn(
         except ValueError as error:
             raise UserError(f"The segments could not be learned: {error}") from error
     report.tell_of(model)
-    return model, described
+    return described
 
 
 def describe(
@@ -203,7 +137,13 @@ def describe(
                 )
         except (ValueError, SpectrumError, MemoryError) as error:
             raise UserError(str(error)) from error
-        report.warnings += dict.fromkeys(str(warning.message) for warning in said)
+        report.warnings += dict.fromkeys(
+            str(warning.message) for warning in said if issubclass(warning.category, SpectrumWarning)
+        )
+        # What others said meanwhile, in Blender's own thread too, is theirs.
+        for warning in said:
+            if not issubclass(warning.category, SpectrumWarning):
+                warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
     of = dict(zip(new, described, strict=True))
     report.laplacians = [of[first].laplacian for first in same]
     return [of[first] for first in same]
@@ -211,31 +151,40 @@ def describe(
 
 def label(
     model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[PoseSignature],
-    settings: WKSSegmentSettings, report: Report, progress: Progress,
+    wanted: Wanted, report: Report, progress: Progress,
 ) -> dict[Character, IntArray]:  # fmt: skip
     """Part of each of a character's polygons, agreed on by all of its poses, and by all objects that share a mesh."""
     labels: dict[Character, IntArray] = {}
-    min_share = None if model.preset == "paper" else settings.min_share / 100
+    min_share = None if model.preset == "paper" else wanted.min_share
     with report.stage("label"):
-        for mine in of_one_mesh(poses):
-            name = poses[mine[0]].character.name
+        together = of_one_mesh(poses)
+        for number, mine in enumerate(together):
+            character = poses[mine[0]].character
+            body = wanted.bodies[character]
+
+            def of_pose(share: float, number: int = number, name: str = character.name) -> None:
+                progress(f'Labels of "{name}"', (number + share) / len(together))
+
             found = model.segment_polygons(
                 [described[i] for i in mine],
                 [poses[i].polygon_of for i in mine],
                 min_share,
-                lambda share, name=name: progress(f'Labels of "{name}"', 1.0),
-                marked=marked_pairs(poses[mine[0]].character, settings.snap_to),
+                of_pose,
+                marked=body.marked,
             )
-            if settings.sides == "two":
+            if wanted.sides == "two":
                 voters = [mine[i] for i in reader.evenly(0, len(mine) - 1, VOTERS)]
-                sides = agreed_sides(model, [poses[i] for i in voters], [described[i] for i in voters], found, progress)
+                sides = agreed_sides(
+                    model, [poses[i] for i in voters], [described[i] for i in voters], found,
+                    lambda stage, share, number=number: progress(stage, (number + share) / len(together)),
+                )  # fmt: skip
                 found = parts.numbered(found, sides)
-            found = filled(found, poses[mine[0]].character)
+            found = filled(found, body)
             labels |= {poses[i].character: found for i in mine}
     occurring = parts.among(np.concatenate(list(labels.values())))
     report.n_segments = len(np.unique(parts.segments_of(np.array(occurring))))
     report.parts = {parts.name_of(part): part for part in occurring}
-    if settings.sides == "two" and len(occurring) == report.n_segments:
+    if wanted.sides == "two" and len(occurring) == report.n_segments:
         report.warn(
             "Left and right are not told apart with the method of the paper: parts are one for both sides"
             if model.regions_ is None
@@ -259,33 +208,35 @@ def agreed_sides(
 
 def soften(
     model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[PoseSignature],
-    labels: dict[Character, IntArray], settings: WKSSegmentSettings, report: Report, progress: Progress,
+    labels: dict[Character, IntArray], wanted: Wanted, report: Report, progress: Progress,
 ) -> dict[Character, dict[int, FloatArray]] | None:  # fmt: skip
     """For each part the weights of each character's vertices, agreed on as labels are.
 
-    None if the settings ask for no soft groups.
+    None if no soft groups are asked for.
     """
-    if settings.vertex_groups != "soft":
+    if wanted.vertex_groups != "soft":
         return None
     weights: dict[Character, dict[int, FloatArray]] = {}
     with report.stage("label"):
-        for mine in of_one_mesh(poses):
+        together = of_one_mesh(poses)
+        for number, mine in enumerate(together):
             character = poses[mine[0]].character
-            progress(f'Weights of "{character.name}"', 1.0)
-            found = soft_weights(model, [poses[i] for i in mine], [described[i] for i in mine])
-            of_parts = by_parts(found, labels[character], character)
+            body = wanted.bodies[character]
+            progress(f'Weights of "{character.name}"', number / len(together))
+            found = soft_weights(model, [poses[i] for i in mine], [described[i] for i in mine], body)
+            of_parts = by_parts(found, labels[character], body)
             weights |= {poses[i].character: of_parts for i in mine}
     return weights
 
 
 def of_one_mesh(poses: Sequence[Pose]) -> list[list[int]]:
     """Indices of poses whose characters share their meshes, together."""
-    meshes = [tuple(obj.data for obj in pose.character.objects) for pose in poses]
+    meshes = [pose.character.meshes for pose in poses]
     return [[i for i, other in enumerate(meshes) if other == mesh] for mesh in dict.fromkeys(meshes)]
 
 
 def write(
-    labels: dict[Character, IntArray], settings: WKSSegmentSettings, report: Report,
+    labels: dict[Character, IntArray], wanted: Wanted, report: Report,
     soft: dict[Character, dict[int, FloatArray]] | None = None,
 ) -> None:  # fmt: skip
     """Write labels, and the weights that `soften` gave, to the objects of each character."""
@@ -296,9 +247,9 @@ def write(
                 if polygons.stop == polygons.start:
                     continue
                 weights = None if soft is None else {part: of[vertices] for part, of in soft[character].items()}
-                if settings.vertex_groups == "hard":
+                if wanted.vertex_groups == "hard":
                     weights = hard_weights(obj.data, values[polygons])
-                write_labels(obj.data, values[polygons], settings.write_colors, settings.write_materials, weights)
+                write_labels(obj.data, values[polygons], wanted.colors, wanted.materials, weights)
 
 
 def stored_model(settings: WKSSegmentSettings) -> PoseSegmentation:
@@ -311,27 +262,11 @@ def stored_model(settings: WKSSegmentSettings) -> PoseSegmentation:
         raise UserError(f"The model in this file cannot be used: {error}") from error
 
 
-def filled(labels: IntArray, character: Character) -> IntArray:
-    """Labels for all polygons of a character: one that is not seen (masked out, say) takes that of the nearest one."""
-    places = reader.places(character, "polygons")
+def filled(labels: IntArray, body: Body) -> IntArray:
+    """Labels for all polygons of a body: one that is not seen (masked out, say) takes that of the nearest one."""
+    places = body.polygons
     labels = np.concatenate([labels, np.full(len(places) - len(labels), -1)])
     unseen = labels < 0
     if unseen.any():
         labels[unseen] = labels[~unseen][cKDTree(places[~unseen]).query(places[unseen])[1]]
     return labels
-
-
-def segment_warnings(model: PoseSegmentation, report: Report) -> list[str]:
-    """What the user should know of the segments that were found."""
-    lost = model.n_segments_ - report.n_segments
-    return [f"{lost} of {model.n_segments_} segments are gone: all of their parts were too small"] if lost > 0 else []
-
-
-def pose_warnings(poses: Sequence[Pose], from_frames: bool) -> list[str]:
-    """What the user should know of the poses that were learned from."""
-    if len(poses) == 1:
-        return ["Learned from one pose only: parts are more reliable with three to five"]
-    if all(pose.is_like(poses[0]) for pose in poses[1:]):
-        hint = "does an animation move the character in these frames?" if from_frames else "pose them differently"
-        return [f"All {len(poses)} poses are the same: {hint}"]
-    return []

@@ -13,8 +13,8 @@ from ..core import PoseSegmentation, PoseSignature
 from ..core.mesh import BoolArray, FloatArray, IntArray
 from ..core.surface import indicator
 from . import parts
-from .characters import Character
-from .poses import Pose, places, polygon_ranges, vertex_ranges
+from .bodies import Body, corners_of
+from .poses import Pose
 
 LEAST = 0.01
 """Smaller soft weights are left out: nearly every vertex would be in every group."""
@@ -22,7 +22,7 @@ LEAST = 0.01
 
 def hard_weights(mesh: bpy.types.Mesh, labels: IntArray) -> dict[int, FloatArray]:
     """For each part (n,) 1 where a vertex is a corner of a polygon of it, else 0; given the (p,) parts of polygons."""
-    vertices, polygons = _corners(mesh)
+    vertices, polygons = corners_of(mesh)
     of_corner = labels[polygons]
     weights = {part: np.zeros(len(mesh.vertices)) for part in parts.among(labels)}
     for part, of_part in weights.items():
@@ -31,28 +31,29 @@ def hard_weights(mesh: bpy.types.Mesh, labels: IntArray) -> dict[int, FloatArray
 
 
 def soft_weights(
-    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[PoseSignature]
-) -> FloatArray:  # fmt: skip
+    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[PoseSignature], body: Body
+) -> FloatArray:
     """(n, n_segments) mean posterior, over poses of the same meshes, at each of the character's own vertices.
 
     Rows sum to 1; weights below `LEAST` are left out. The vertices of all objects are numbered one object after
     another. One that no pose shows (masked out, say) takes the weights of the nearest one.
     """
     means, seen = zip(
-        *(own_vertices(pose, model.predict_soft(of)) for pose, of in zip(poses, described, strict=True)), strict=True
+        *(own_vertices(pose, model.predict_soft(of), body) for pose, of in zip(poses, described, strict=True)),
+        strict=True,
     )
     times_seen = np.sum(seen, axis=0)
     weights = np.sum(means, axis=0) / np.maximum(times_seen, 1)[:, None]
     unseen = times_seen == 0
     if unseen.any():
-        place = places(poses[0].character, "vertices")
-        weights[unseen] = weights[~unseen][cKDTree(place[~unseen]).query(place[unseen])[1]]
+        places = body.vertices
+        weights[unseen] = weights[~unseen][cKDTree(places[~unseen]).query(places[unseen])[1]]
     # Among very many segments, the largest can be small too.
     weights[(weights < LEAST) & (weights < weights.max(axis=1, keepdims=True))] = 0
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
-def by_parts(weights: FloatArray, labels: IntArray, character: Character) -> dict[int, FloatArray]:
+def by_parts(weights: FloatArray, labels: IntArray, body: Body) -> dict[int, FloatArray]:
     """Weights of parts at each of a character's n own vertices, whose sum over a segment's parts is the segment's.
 
     Parameters
@@ -62,7 +63,7 @@ def by_parts(weights: FloatArray, labels: IntArray, character: Character) -> dic
     labels : (p,) int array
         Part of each of the character's polygons. A vertex has the weights of the nearest part of each segment.
     """
-    vertices, polygons = places(character, "vertices"), places(character, "polygons")
+    vertices, polygons = body.vertices, body.polygons
     result: dict[int, FloatArray] = {}
     for segment in np.flatnonzero(weights.any(axis=0)).tolist():
         mine = np.flatnonzero(parts.segments_of(labels) == segment)
@@ -74,20 +75,21 @@ def by_parts(weights: FloatArray, labels: IntArray, character: Character) -> dic
     return result
 
 
-def own_vertices(pose: Pose, values: FloatArray) -> tuple[FloatArray, BoolArray]:
+def own_vertices(pose: Pose, values: FloatArray, body: Body) -> tuple[FloatArray, BoolArray]:
     """Carry (n', k) values at the vertices of a pose to the (n, k) own ones of its character, and which are seen.
 
     Where modifiers change faces, only polygons are known: a vertex gets the mean over the polygons around it, by area.
     Rows of vertices that are not seen are 0.
     """
-    n_vertices = vertex_ranges(pose.character)[-1][1].stop
+    n_vertices = len(body.vertices)
     own, seen = np.zeros((n_vertices, values.shape[1])), np.zeros(n_vertices, dtype=bool)
     known = np.flatnonzero(pose.vertex_of >= 0)
     own[pose.vertex_of[known]] = values[known]
     seen[pose.vertex_of[known]] = True
     if seen.all():
         return own, seen
-    around = _around(pose.character)
+    # 1 where a polygon has a corner at a vertex.
+    around = csr_matrix((np.ones(len(body.corners[0])), body.corners), shape=(n_vertices, len(body.polygons)))
     of_polygon = indicator(pose.polygon_of, around.shape[1])
     # A polygon without area still speaks, if very softly.
     areas = pose.mesh.face_areas / pose.mesh.area + np.finfo(float).eps
@@ -96,25 +98,3 @@ def own_vertices(pose: Pose, values: FloatArray) -> tuple[FloatArray, BoolArray]
     by_polygons = ~seen & (totals > 0)
     own[by_polygons] = sums[by_polygons] / totals[by_polygons, None]
     return own, seen | by_polygons
-
-
-def _around(character: Character) -> csr_matrix:
-    """(n, p) 1 where a polygon of a character has a corner at a vertex."""
-    rows, columns = [], []
-    ranges = list(zip(vertex_ranges(character), polygon_ranges(character), strict=True))
-    for (obj, its_vertices), (_, its_polygons) in ranges:
-        vertices, polygons = _corners(obj.data)
-        rows.append(vertices + its_vertices.start)
-        columns.append(polygons + its_polygons.start)
-    row, column = np.concatenate(rows), np.concatenate(columns)
-    shape = (ranges[-1][0][1].stop, ranges[-1][1][1].stop)
-    return csr_matrix((np.ones(len(row)), (row, column)), shape=shape)
-
-
-def _corners(mesh: bpy.types.Mesh) -> tuple[IntArray, IntArray]:
-    """Vertex and polygon of each corner of a mesh."""
-    vertices = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", vertices)
-    size = np.empty(len(mesh.polygons), dtype=np.int32)
-    mesh.polygons.foreach_get("loop_total", size)
-    return vertices.astype(np.int64), np.repeat(np.arange(len(size)), size)

@@ -8,7 +8,7 @@ from .mixture import GaussianMixture, fit_mixture
 from .model_file import ModelFileError
 from .segmentation import PoseSegmentation
 from .signature import heat_kernel_signature, wave_kernel_signature
-from .spectrum import SpectrumError, eigenpairs
+from .spectrum import SpectrumError, SpectrumWarning, eigenpairs
 from .surface import Connection, Surface, connect, prepare_surface
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "PoseSegmentation",
     "PoseSignature",
     "SpectrumError",
+    "SpectrumWarning",
     "Surface",
     "TriangleMesh",
     "connect",

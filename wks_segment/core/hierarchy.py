@@ -61,6 +61,10 @@ CHUNK = 1024
 """Rows in one step of what is done entry by entry."""
 
 
+class SpectrumWarning(UserWarning):
+    """Eigenpairs came out otherwise than they were asked for."""
+
+
 class NotConvergedError(ArithmeticError):
     """Corrections stay large, or single precision does not suffice."""
 
@@ -245,6 +249,7 @@ def _lifted(
                 warnings.warn(
                     f"eigenfunctions {columns.start} to {columns.stop} of this very large mesh may be off by some per "
                     "cent: compare with a decimated copy, or use the exact solver",
+                    SpectrumWarning,
                     stacklevel=2,
                 )
         yield columns, vectors

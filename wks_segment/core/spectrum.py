@@ -21,13 +21,13 @@ from scipy.sparse import csr_matrix, diags
 from threadpoolctl import threadpool_limits
 
 from .coarse import Level
-from .hierarchy import LARGE, MIDDLE_CELLS_PER_PAIR, NotConvergedError, hierarchical_eigenpairs
+from .hierarchy import LARGE, MIDDLE_CELLS_PER_PAIR, NotConvergedError, SpectrumWarning, hierarchical_eigenpairs
 from .lanczos import SpectrumError, check, lanczos_eigenpairs
 from .laplacian import stiffness_matrix, unit_area_masses
 from .memory import available_memory
 from .mesh import FloatArray, IntArray, TriangleMesh
 
-__all__ = ["Accuracy", "SpectrumError", "eigenpair_panels", "eigenpairs", "memory_needed"]
+__all__ = ["Accuracy", "SpectrumError", "SpectrumWarning", "eigenpair_panels", "eigenpairs", "memory_needed"]
 
 Accuracy = Literal["fast", "exact"]
 Panels = Iterator[tuple[slice, FloatArray]]
@@ -110,7 +110,9 @@ def eigenpair_panels(
     if n_pairs < 1:
         raise ValueError(f"n_pairs must be at least 1, not {n_pairs}")
     if n_pairs > mesh.n_vertices:
-        warnings.warn(f"the mesh has only {mesh.n_vertices} vertices, and so many eigenpairs", stacklevel=3)
+        warnings.warn(
+            f"the mesh has only {mesh.n_vertices} vertices, and so many eigenpairs", SpectrumWarning, stacklevel=3
+        )
         n_pairs = mesh.n_vertices
     used = np.zeros(mesh.n_vertices, dtype=bool)
     used[mesh.faces] = True
@@ -237,7 +239,8 @@ def _solved(
             constants: FloatArray = (zero_modes / problem.root()[:, None]).astype(np.float32)
             return np.concatenate([np.zeros(n_zero), values]), _behind(constants, panels)
         except NotConvergedError:
-            warnings.warn("the fast eigensolver did not converge on this mesh; used the exact one", stacklevel=5)
+            text = "the fast eigensolver did not converge on this mesh; used the exact one"
+            warnings.warn(text, SpectrumWarning, stacklevel=5)
             _check_memory(n, n_pairs, "exact")
     values, vectors = np.zeros(0), np.zeros((n, 0))
     if count and dense:

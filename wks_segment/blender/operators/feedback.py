@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 import bpy
 
-from ...core import PoseSegmentation
 from ...core.description import Progress
-from .. import tasks
 from ..characters import mesh_objects, why_no_mesh
-from ..errors import TooLargeError, UserError
-from ..poses import Pose
-from ..tasks import Report
+from ..jobs import BUSY, desk_of
+from ..report import Report
 
 LOOK = "VERTEX"
 """Color mode of solid shading that shows the color attribute."""
@@ -78,40 +75,9 @@ def has_selected_mesh(cls: type[bpy.types.Operator], context: bpy.types.Context)
     return True
 
 
-class AsksFirst:
-    """An operator that asks before a job above the user's limits; without a window it refuses."""
-
-    confirmed: bpy.props.BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
-
-    def check_limits(self, context: bpy.types.Context, model: PoseSegmentation, poses: Sequence[Pose]) -> None:
-        """Raise TooLargeError unless the user has agreed."""
-        if not self.confirmed:
-            tasks.check_limits(model, poses, context.scene.wks_segment)
-
-    def work(self, context: bpy.types.Context) -> set[str]:
-        """Do it; UserError if it cannot be done."""
-        raise NotImplementedError
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Called by a button or a shortcut."""
-        try:
-            return self.work(context)
-        except TooLargeError as error:
-            self.confirmed = True
-            return context.window_manager.invoke_confirm(
-                self, event, title="Large Job", message=str(error), confirm_text="Go On"
-            )
-        except UserError as error:
-            return self.refused(error)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        """Called by a script, or after the question."""
-        try:
-            return self.work(context)
-        except UserError as error:
-            return self.refused(error)
-
-    def refused(self, error: UserError) -> set[str]:
-        """Tell why."""
-        self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]  # an operator's own
-        return {"CANCELLED"}
+def no_job_runs(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """For `poll`: whether no job is running; sets the message if one is."""
+    if desk_of(context).job is not None:
+        cls.poll_message_set(BUSY)
+        return False
+    return True

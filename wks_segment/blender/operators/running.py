@@ -1,0 +1,124 @@
+"""How operators run their work: in a thread while the window lives on, or at once for a script."""
+
+from __future__ import annotations
+
+import bpy
+
+from .. import tasks
+from ..errors import ChangedError, EndedError, TooLargeError, UserError
+from ..jobs import Job, desk_of, redraw
+from ..work import Work
+from . import feedback
+
+WRITABLE = ("OBJECT", "POSE")
+"""Modes in which Blender's undo takes note of meshes."""
+
+
+class RunsWork:
+    """An operator that runs a `Work`; it asks before one above the user's limits, and without a window refuses it."""
+
+    confirmed: bpy.props.BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+    bl_label: str
+    verb = ""
+    """What it has done, for the status bar."""
+    job: Job
+    work: Work
+    asked = False
+    """Whether the next call of `execute` is the answer to a question in the window."""
+
+    def read(self, context: bpy.types.Context) -> Work:
+        """Read what the work needs; UserError if it cannot be used."""
+        raise NotImplementedError
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Called by a button or a shortcut."""
+        if bpy.app.background or context.window is None:
+            return self.execute(context)
+        try:
+            return self.started(context)
+        except TooLargeError as error:
+            self.confirmed = self.asked = True
+            return context.window_manager.invoke_confirm(
+                self, event, title="Large Job", message=str(error), confirm_text="Go On"
+            )
+        except UserError as error:
+            return self.refused(error)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Called by a script, by a redo, or after the question."""
+        try:
+            if self.asked:
+                self.asked = False
+                return self.started(context)
+            self.work = self.checked(context)
+            with feedback.cursor_progress(context) as progress:
+                self.work.compute(progress)
+            return self.written(context)
+        except UserError as error:
+            return self.refused(error)
+
+    def started(self, context: bpy.types.Context) -> set[str]:
+        """Read, and let a thread compute; UserError if it cannot be done."""
+        self.begin(context)
+        desk_of(context).tick(context)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def begin(self, context: bpy.types.Context) -> None:
+        """Read, and lay the job on the desk."""
+        self.work = self.checked(context)
+        self.job = desk_of(context).start(self.bl_label, self.work.compute, self.work.watch.glance)
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Called for all that happens in the window: leave it to others, but for ESC and the timer."""
+        if event.type == "ESC" and event.value == "PRESS" and not self.job.ending:
+            self.job.end()
+            return {"RUNNING_MODAL"}
+        return self.step(context) if event.type == "TIMER" else {"PASS_THROUGH"}
+
+    def step(self, context: bpy.types.Context) -> set[str]:
+        """Look at the job; when it is over, write."""
+        redraw(context)
+        if not self.job.step():
+            return {"PASS_THROUGH"}
+        if context.mode not in WRITABLE and self.job.succeeded:
+            self.job.stage = "Done, to be written in Object Mode"
+            return {"PASS_THROUGH"}
+        said = ""
+        try:
+            self.job.result()
+            return self.written(context)
+        except (ChangedError, EndedError) as error:
+            self.job.end(str(error))
+            said = self.job.epitaph
+            self.report({"WARNING"}, said)  # type: ignore[attr-defined]  # an operator's own
+            return {"CANCELLED"}
+        except UserError as error:
+            return self.refused(error)
+        finally:
+            desk_of(context).clear(said)
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Called by Blender when it takes the window away."""
+        self.job.end("its window was closed")
+        desk_of(context).clear(self.job.epitaph)
+
+    def checked(self, context: bpy.types.Context) -> Work:
+        """What was read; TooLargeError unless it is within the limits or the user has agreed."""
+        work = self.read(context)
+        if not self.confirmed:
+            tasks.check_limits(work.model, work.poses, context.scene.wks_segment)
+        return work
+
+    def written(self, context: bpy.types.Context) -> set[str]:
+        """Write what was computed and report."""
+        self.work.write()
+        if self.work.wanted.colors:
+            feedback.show_colors(context)
+        return feedback.finish(self, self.verb, self.work.report)
+
+    def refused(self, error: UserError) -> set[str]:
+        """Tell why."""
+        self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]  # an operator's own
+        return {"CANCELLED"}
