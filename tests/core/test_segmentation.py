@@ -167,7 +167,7 @@ class StopError(Exception):
     pass
 
 
-@pytest.mark.parametrize("stage", ["pose", "mixture"])
+@pytest.mark.parametrize("stage", ["pose", "mixture", "parts", "regions"])
 def test_an_error_from_progress_ends_learning_in_the_middle_of_a_stage(stage):
     calls = []
 
@@ -180,7 +180,8 @@ def test_an_error_from_progress_ends_learning_in_the_middle_of_a_stage(stage):
     learner = PoseSegmentation(**SMALL)
     with pytest.raises(StopError):
         learner.fit(POSES, progress=progress)
-    assert not hasattr(learner, "mixture_")
+    assert len(calls) == 3
+    assert not hasattr(learner, "regions_") or learner.regions_ is None
 
 
 def test_an_error_from_progress_ends_labelling(model):

@@ -222,8 +222,11 @@ def soften(
         for number, mine in enumerate(together):
             character = poses[mine[0]].character
             body = wanted.bodies[character]
-            progress(f'Weights of "{character.name}"', number / len(together))
-            found = soft_weights(model, [poses[i] for i in mine], [described[i] for i in mine], body)
+
+            def of_pose(share: float, number: int = number, name: str = character.name) -> None:
+                progress(f'Weights of "{name}"', (number + share) / len(together))
+
+            found = soft_weights(model, [poses[i] for i in mine], [described[i] for i in mine], body, of_pose)
             of_parts = by_parts(found, labels[character], body)
             weights |= {poses[i].character: of_parts for i in mine}
     return weights

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import bpy
 import numpy as np
@@ -31,19 +31,22 @@ def hard_weights(mesh: bpy.types.Mesh, labels: IntArray) -> dict[int, FloatArray
 
 
 def soft_weights(
-    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[PoseSignature], body: Body
-) -> FloatArray:
+    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[PoseSignature], body: Body,
+    tick: Callable[[float], None] | None = None,
+) -> FloatArray:  # fmt: skip
     """(n, n_segments) mean posterior, over poses of the same meshes, at each of the character's own vertices.
 
     Rows sum to 1; weights below `LEAST` are left out. The vertices of all objects are numbered one object after
-    another. One that no pose shows (masked out, say) takes the weights of the nearest one.
+    another. One that no pose shows (masked out, say) takes the weights of the nearest one. `tick` is called with the
+    share that is done.
     """
-    means, seen = zip(
-        *(own_vertices(pose, model.predict_soft(of), body) for pose, of in zip(poses, described, strict=True)),
-        strict=True,
-    )
-    times_seen = np.sum(seen, axis=0)
-    weights = np.sum(means, axis=0) / np.maximum(times_seen, 1)[:, None]
+    sums, times_seen = np.zeros(()), np.zeros(len(body.vertices), dtype=np.int64)
+    for i, (pose, of_pose) in enumerate(zip(poses, described, strict=True)):
+        if tick:
+            tick(i / len(poses))
+        own, seen = own_vertices(pose, model.predict_soft(of_pose), body)
+        sums, times_seen = sums + own, times_seen + seen
+    weights = sums / np.maximum(times_seen, 1)[:, None]
     unseen = times_seen == 0
     if unseen.any():
         places = body.vertices

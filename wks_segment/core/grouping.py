@@ -9,6 +9,7 @@ components" (2010), with the surface's own geometry in the place of the densitie
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,11 +57,11 @@ class Ground:
     part: IntArray
 
     @classmethod
-    def of(cls, surface: Surface) -> Ground:
-        """Find the neighbours, weigh their borders and cut."""
+    def of(cls, surface: Surface, tick: Callable[[float], None] | None = None) -> Ground:
+        """Find the neighbours, weigh their borders and cut; `tick` is called with the share that is done."""
         original = surface.original
         adjacency = FaceAdjacency.of(surface.welded_faces, original.vertices)
-        weights, curvature = border_weights(surface, adjacency)
+        weights, curvature = border_weights(surface, adjacency, tick)
         lengths = weights * adjacency.lengths / np.sqrt(original.area)
         return cls(surface, adjacency, lengths, parts(surface, adjacency, lengths, curvature))
 

@@ -25,6 +25,8 @@ COMPARED = 4_000
 """Faces on which the labels of the learned poses are compared."""
 REGROUPED = 5
 """Rounds of joining at most, until no segment is lost as crumbs."""
+LAID = 0.8
+"""Share of the time of a pose when it is laid out, see `Ground`; the rest is to lay the mixtures on it."""
 COMPONENTS, PER_SEGMENT, MOST_MORE = 24, 3, 64
 """Components of the mixture: at least so many, and so many for each segment, but at most so many more than segments."""
 SMOOTHING_LENGTH = 0.03
@@ -67,11 +69,17 @@ class Candidates:
         first = self.poses[0].surface.original
         drawn = drawn_evenly(first.face_areas / first.area, COMPARED) if of_one_mesh(self.poses) else None
         for i, pose in enumerate(self.poses):
-            tick(i / len(self.poses))
-            ground, standardised = Ground.of(pose.surface), self.standardised(pose.signature)
+
+            def of_pose(share: float, begun: int = i) -> None:
+                tick((begun + share) / len(self.poses))
+
+            of_pose(0.0)
+            ground = Ground.of(pose.surface, lambda share, of_pose=of_pose: of_pose(LAID * share))  # type: ignore[misc]
+            standardised = self.standardised(pose.signature)
             grounds.append(ground)
             flow = HeatFlow(pose.surface.mesh, SMOOTHING_LENGTH)
             for j, mixture in enumerate(self.mixtures):
+                of_pose(LAID + (1 - LAID) * j / len(self.mixtures))
                 of_faces = pose.surface.to_faces(flow.smooth(mixture.posteriors(standardised)))
                 contacts[j].append(Contacts.on(ground, of_faces))
                 likeliest[j].append(of_faces.argmax(axis=1))

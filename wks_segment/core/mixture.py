@@ -32,7 +32,7 @@ SEEDS = range(6)
 them. The same in every fit: what comes out is no matter of luck."""
 SAME = 1e-3
 """Starts whose log-likelihoods differ by less than this share ended in the same mixture."""
-SKETCHED = 0.6
+SKETCHED = 0.3
 """Share of the work that the starts are."""
 SKETCH = 4_000
 """Samples in the sketch."""

@@ -23,7 +23,7 @@ from .laplacian import unit_area_masses
 from .learning import AUTO, MIN_SHARE, SMOOTHING_LENGTH, Candidates, fine_mixtures, of_one_mesh
 from .mesh import FloatArray, IntArray, TriangleMesh
 from .mixture import CovarianceType, GaussianMixture, drawn_evenly, fit_mixtures
-from .region_atlas import FIELDS, RegionAtlas, Regions, side_field, sides_of_parts
+from .region_atlas import FIELDS, RegionAtlas, Regions, Traits, side_field, sides_of_parts
 from .regions import FaceAdjacency, connected_regions
 from .smoothing import HeatFlow
 from .spectrum import Accuracy
@@ -32,10 +32,14 @@ from .surface import Pieces
 Scaling = Literal["log", "raw"]
 Preset = Literal["default", "paper"]
 
-DESCRIBED = 0.8
+DESCRIBED = 0.2
 """Share of the work that is signatures."""
-MIXED = 0.9
+MIXED = 0.5
 """Share of the work when the mixture is fitted."""
+GROUPED = 0.9
+"""Share of the work when its components are grouped."""
+CLEANED = 0.7
+"""Share of the time that finding regions takes, the rest is telling which is which."""
 SIGNATURE_OFFSET = 1.0
 """Added to the signature, whose mean is 1, before its logarithm: smaller values change much from pose to pose and say
 little, and tiny loose parts take no part in low energies."""
@@ -183,7 +187,10 @@ class PoseSegmentation(PoseDescriber):
             tick("mixture", DESCRIBED + (MIXED - DESCRIBED) * share)
 
         def grouping(share: float) -> None:
-            tick("parts", MIXED + (1 - MIXED) * share)
+            tick("parts", MIXED + (GROUPED - MIXED) * share)
+
+        def naming(share: float) -> None:
+            tick("regions", GROUPED + (1 - GROUPED) * share)
 
         wanted, covariance_type = self._least_components(), self._setting("covariance_type")
         self.grouping_: Grouping | None = None
@@ -195,7 +202,7 @@ class PoseSegmentation(PoseDescriber):
             mixtures = fine_mixtures(samples, shares, wanted, types, self.n_segments == "auto", mixing)
             candidates = Candidates(poses, mixtures, self._standardised, self._number)
             self.mixture_, self.grouping_ = candidates.best(grouping)
-            self.regions_ = self._atlas(poses, rest)
+            self.regions_ = self._atlas(poses, rest, naming)
         tick("done", 1.0)
         return self
 
@@ -509,7 +516,9 @@ class PoseSegmentation(PoseDescriber):
         return np.pad(fields, ((0, 0), (0, FIELDS - axes.shape[1])))
 
     @threadpool_limits.wrap(limits=1, user_api="blas")  # as in clean_labels
-    def _atlas(self, poses: Sequence[PoseSignature], rest: TriangleMesh | None) -> RegionAtlas:
+    def _atlas(
+        self, poses: Sequence[PoseSignature], rest: TriangleMesh | None, tick: Callable[[float], None]
+    ) -> RegionAtlas:
         """The connected regions of the learned poses, and which are left and right."""
         first = poses[0].surface.original
         if rest is not None and not np.array_equal(rest.faces, first.faces):
@@ -517,11 +526,20 @@ class PoseSegmentation(PoseDescriber):
         assert self.grouping_ is not None
         n_groups = self.grouping_.number_of_wholes(self.n_segments_)
         together = [poses] if of_one_mesh(poses) else [[pose] for pose in poses]
-        found, traits = [], []
+        found: list[Regions] = []
+        traits: list[Traits] = []
         for alike in together:
-            regions = Regions.of(*self._clean(alike, None, None, n_groups=n_groups), alike[0].surface.original)
+
+            def cleaning(share: float, begun: int = len(traits), count: int = len(alike)) -> None:
+                tick((begun + CLEANED * share * count) / len(poses))
+
+            labels, adjacency = self._clean(alike, None, None, cleaning, n_groups=n_groups)
+            regions = Regions.of(labels, adjacency, alike[0].surface.original)
             found.append(regions)
-            traits += [regions.traits(pose.surface, self._fields(pose)) for pose in alike]
+            begun = len(traits)
+            for i, pose in enumerate(alike):
+                tick((begun + CLEANED * len(alike) + (1 - CLEANED) * i) / len(poses))
+                traits.append(regions.traits(pose.surface, self._fields(pose)))
         centres = found[0].centres(first if rest is None else rest)
         return RegionAtlas.learned(n_groups, traits, centres, alike=len(found) == 1)
 

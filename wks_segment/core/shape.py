@@ -7,6 +7,8 @@ Cohen-Or 2008).
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
@@ -31,6 +33,8 @@ SLACK = 0.01
 """How much further than the nearest place the one may be that is found, as a fraction."""
 MOST_BALLS = 20_000
 """Vertices at which thickness is measured; others take it from the nearest of these."""
+AT_ONCE = 2_000
+"""Balls between two reports of progress."""
 CREASE, MOST_CONCAVE, MOST_CONVEX = 0.4, 15.0, 2.0
 """Weight of a border by e to this times its curvature, which is taken between these bounds."""
 STEP, MOST_STEP = 0.1, 40.0
@@ -92,11 +96,11 @@ def curvature_across(surface: Surface, normals: FloatArray, adjacency: FaceAdjac
     return np.asarray(np.einsum("ij,ij->i", of_faces[b] - of_faces[a], step) / squared)
 
 
-def log_thickness(surface: Surface, normals: FloatArray) -> FloatArray:
+def log_thickness(surface: Surface, normals: FloatArray, tick: Callable[[float], None] | None = None) -> FloatArray:
     """(n',) logarithm of the radius of the largest ball that touches a surface of area 1 at a vertex from inside.
 
     By the shrinking ball of Ma, Bae and Choi (2012), against the tangent planes of what it touches, so that a thin
-    sheet is seen on a coarse mesh too.
+    sheet is seen on a coarse mesh too. `tick` is called with the share that is done, about.
     """
     mesh = surface.mesh
     places = mesh.vertices / np.sqrt(mesh.area)
@@ -106,10 +110,15 @@ def log_thickness(surface: Surface, normals: FloatArray) -> FloatArray:
     tree = cKDTree(points)
     radius = np.full(len(points), WIDEST)
     active = np.arange(len(points))
-    for _ in range(ROUNDS):
+    for i in range(ROUNDS):
         p, n = points[active], directions[active]
-        # From the middle of a ball everything is equally near, and the exact search would look at all of it.
-        distance, nearest = tree.query(p - radius[active, None] * n, eps=SLACK)
+        distance, nearest = np.empty(len(active)), np.empty(len(active), dtype=np.int64)
+        for begun in range(0, len(active), AT_ONCE):
+            if tick:
+                tick(1 - 0.5**i * (1 - 0.5 * begun / len(active)))
+            some = slice(begun, begun + AT_ONCE)
+            # From the middle of a ball everything is equally near, and the exact search would look at all of it.
+            distance[some], nearest[some] = tree.query(p[some] - radius[active[some], None] * n[some], eps=SLACK)
         inside = distance < radius[active] * (1 - 1e-4) - 1e-9
         active, nearest, p, n = active[inside], nearest[inside], p[inside], n[inside]
         if not len(active):
@@ -123,12 +132,17 @@ def log_thickness(surface: Surface, normals: FloatArray) -> FloatArray:
     return HeatFlow(mesh, THICKNESS_LENGTH).smooth(logs)[:, 0].astype(np.float64)
 
 
-def border_weights(surface: Surface, adjacency: FaceAdjacency) -> tuple[FloatArray, FloatArray]:
-    """(p,) weight of the border between neighbours, 1 where nothing speaks for a cut, and the fine curvature there."""
+def border_weights(
+    surface: Surface, adjacency: FaceAdjacency, tick: Callable[[float], None] | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """(p,) weight of the border between neighbours, 1 where nothing speaks for a cut, and the fine curvature there.
+
+    `tick` is called with the share that is done.
+    """
     original = surface.original
     normals = vertex_normals(surface)
     fine, coarse = (smooth_normals(surface, normals, length) for length in (FINE, COARSE))
-    thickness = surface.to_faces(log_thickness(surface, fine)[:, None])[:, 0]
+    thickness = surface.to_faces(log_thickness(surface, fine, tick)[:, None])[:, 0]
     curvature = curvature_across(surface, coarse, adjacency)
     centres = original.vertices[original.faces].mean(axis=1) / np.sqrt(original.area)
     a, b = adjacency.pairs.T
