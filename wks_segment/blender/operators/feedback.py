@@ -59,6 +59,11 @@ def hide_colors(context: bpy.types.Context) -> None:
         space.shading.color_type = "MATERIAL"
 
 
+def has_window(context: bpy.types.Context) -> bool:
+    """Whether there is a window that lives on while a job runs."""
+    return not bpy.app.background and context.window is not None
+
+
 def in_object_mode(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """For `poll`: whether the mode is right; sets the message if not."""
     if context.mode != "OBJECT":

@@ -33,7 +33,7 @@ class RunsWork:
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Called by a button or a shortcut."""
-        if bpy.app.background or context.window is None:
+        if not feedback.has_window(context):
             return self.execute(context)
         try:
             return self.started(context)
