@@ -19,6 +19,7 @@ CHAIN = [
     "laplacian",
     "intrinsic",
     "factor",
+    "dense",
     "coarse",
     "hierarchy",
     "lanczos",

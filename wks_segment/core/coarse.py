@@ -9,10 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular
+from scipy.linalg import LinAlgError, cholesky
 from scipy.sparse import coo_matrix, csr_matrix, diags, identity, vstack
 from scipy.sparse.csgraph import connected_components
 
+from .dense import lowest_eigenpairs, solved
 from .laplacian import stiffness_matrix, unit_area_masses
 from .mesh import FloatArray, IntArray, TriangleMesh
 
@@ -117,10 +118,9 @@ def coarse_eigenpairs(level: Level, n_zero: int, count: int) -> tuple[FloatArray
     mass = level.mass.toarray()
     mass[np.diag_indices_from(mass)] *= 1 + np.finfo(np.float32).eps
     factor = cholesky(mass, lower=True)
-    half = solve_triangular(factor, level.stiffness.toarray(), lower=True)
-    reduced = solve_triangular(factor, half.T, lower=True)
-    values, weights = eigh((reduced + reduced.T) / 2, subset_by_index=[0, min(len(mass), n_zero + count) - 1])
-    vectors = solve_triangular(factor, weights[:, n_zero:], lower=True, trans="T")
+    reduced = solved(factor, solved(factor, level.stiffness.toarray()).T)
+    values, weights = lowest_eigenpairs((reduced + reduced.T) / 2, n_zero + count)
+    vectors = solved(factor, weights[:, n_zero:], transposed=True)
     return values[n_zero:].astype(np.float64), np.ascontiguousarray(vectors)
 
 
