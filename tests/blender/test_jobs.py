@@ -413,6 +413,7 @@ def test_defect_of_ours_is_no_silence(poses, monkeypatch):
     with pytest.raises(ZeroDivisionError):
         ended(ran)
     assert desk_of(bpy.context).job is None
+    assert ran.modal(bpy.context, SimpleNamespace(type="TIMER", value="NOTHING")) == {"CANCELLED"}
 
 
 def test_what_others_warn_of_meanwhile_is_theirs(poses, at):

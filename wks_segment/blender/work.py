@@ -18,9 +18,10 @@ from .tasks import Wanted
 from .training import read_training_poses
 from .watch import Watch
 
-LABELLING = 0.9
-"""Share of the work when labelling begins, and that of the time."""
-SOFTENING = 0.97
+LEARNED, DESCRIBED = 0.9, 0.6
+"""Share of the work that is done when labelling begins: in learning, and in applying."""
+LABELLED = 0.7
+"""Share of the rest that is labelling, not soft weights."""
 
 
 @dataclass
@@ -77,15 +78,16 @@ class Work:
 
     def compute(self, progress: Progress) -> None:
         """Describe, learn if that is the work, label; UserError if the core refuses. Fit for a thread."""
+        begun = LEARNED if self.learns else DESCRIBED
 
         def describing(stage: str, share: float) -> None:
-            progress(stage, LABELLING * share)
+            progress(stage, begun * share)
 
         def labelling(stage: str, share: float) -> None:
-            progress(stage, LABELLING + (SOFTENING - LABELLING) * share)
+            progress(stage, begun + (1 - begun) * LABELLED * share)
 
         def softening(stage: str, share: float) -> None:
-            progress(stage, SOFTENING + (1 - SOFTENING) * share)
+            progress(stage, begun + (1 - begun) * (LABELLED + (1 - LABELLED) * share))
 
         model, poses, wanted, report = self.model, self.poses, self.wanted, self.report
         step = tasks.learn if self.learns else tasks.describe

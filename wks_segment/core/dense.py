@@ -15,15 +15,13 @@ from numpy.typing import NDArray
 from scipy import LowLevelCallable
 from scipy.linalg import LinAlgError, cython_lapack, solve_triangular
 
-from .mesh import FloatArray
-
 ARGUMENTS = 21
 """Of syevr."""
 COLUMNS = 256
 """Columns that are solved for at once, so that the lock is kept for a moment only."""
 
 
-def lowest_eigenpairs(matrix: FloatArray, count: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def lowest_eigenpairs(matrix: NDArray[Any], count: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """(k,) lowest eigenvalues and (n, k) eigenvectors of a symmetric matrix in float32, at most `count`.
 
     Raises
@@ -56,7 +54,7 @@ def lowest_eigenpairs(matrix: FloatArray, count: int) -> tuple[NDArray[np.float3
     return values[: found.value], vectors[:, : found.value]
 
 
-def solved(factor: FloatArray, right: FloatArray, transposed: bool = False) -> FloatArray:
+def solved(factor: NDArray[Any], right: NDArray[Any], transposed: bool = False) -> NDArray[Any]:
     """X of L X = R, or of Lᵀ X = R, for a lower triangular L."""
     panels = [right[:, begun : begun + COLUMNS] for begun in range(0, right.shape[1], COLUMNS)]
     return np.hstack([solve_triangular(factor, panel, lower=True, trans=int(transposed)) for panel in panels])

@@ -72,6 +72,8 @@ class RunsWork:
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Called for all that happens in the window: leave it to others, but for ESC and the timer."""
+        if desk_of(context).job is not self.job:  # it broke off, and Blender calls on
+            return {"CANCELLED"}
         if event.type == "ESC" and event.value == "PRESS" and not self.job.ending:
             self.job.end()
             return {"RUNNING_MODAL"}
