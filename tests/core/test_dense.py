@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import LinAlgError, eigh, solve_triangular
 
+from wks_segment.core import dense
 from wks_segment.core.dense import COLUMNS, lowest_eigenpairs, solved
 
 
@@ -20,6 +21,19 @@ def test_eigenpairs_are_those_of_scipy(n, count):
     np.testing.assert_allclose(values, expected, rtol=1e-4, atol=1e-4)
     np.testing.assert_allclose(np.abs((vectors * directions).sum(axis=0)), 1, atol=1e-3)
     assert (values.dtype, vectors.dtype, vectors.shape) == (np.float32, np.float32, (n, min(n, count)))
+
+
+def test_where_the_function_is_another_it_is_scipys_call(monkeypatch):
+    matrix = symmetric(40)
+    values, vectors = lowest_eigenpairs(matrix, 5)
+    monkeypatch.setattr(dense, "_syevr", lambda: None)
+    others, directions = lowest_eigenpairs(matrix, 5)
+    np.testing.assert_allclose(values, others, rtol=1e-4)
+    np.testing.assert_allclose(np.abs((vectors * directions).sum(axis=0)), 1, atol=1e-3)
+
+
+def test_bundled_scipy_is_called_without_the_lock():
+    assert dense._syevr() is not None
 
 
 def test_matrix_is_left_as_it_was():

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import LowLevelCallable
-from scipy.linalg import LinAlgError, cython_lapack, solve_triangular
+from scipy.linalg import LinAlgError, cython_lapack, eigh, solve_triangular
 
-ARGUMENTS = 21
-"""Of syevr."""
+ARGUMENTS, WHOLE = 21, 11
+"""Of syevr, and how many of them are whole numbers."""
 COLUMNS = 256
 """Columns that are solved for at once, so that the lock is kept for a moment only."""
 
@@ -31,7 +31,10 @@ def lowest_eigenpairs(matrix: NDArray[Any], count: int) -> tuple[NDArray[np.floa
     """
     if not np.isfinite(matrix).all():
         raise LinAlgError("the matrix has entries that are not finite")
-    n, count = len(matrix), min(count, len(matrix))
+    n, count, syevr = len(matrix), min(count, len(matrix)), _syevr()
+    if syevr is None:
+        values, vectors = eigh(matrix, subset_by_index=[0, count - 1])
+        return values, vectors
     a = np.array(matrix, dtype=np.float32, order="F")
     values, vectors = np.empty(n, dtype=np.float32), np.empty((n, count), dtype=np.float32, order="F")
     support = np.empty(2 * n, dtype=np.int32)
@@ -43,7 +46,7 @@ def lowest_eigenpairs(matrix: NDArray[Any], count: int) -> tuple[NDArray[np.floa
             sizes = len(work), len(whole)
         found, info = ctypes.c_int(), ctypes.c_int()
         nothing, tolerance = ctypes.c_float(), ctypes.c_float()
-        _syevr()(
+        syevr(
             *(ctypes.byref(ctypes.c_char(letter)) for letter in (b"V", b"I", b"L")),
             _int(n), a.ctypes, _int(n), ctypes.byref(nothing), ctypes.byref(nothing), _int(1), _int(count),
             ctypes.byref(tolerance), ctypes.byref(found), values.ctypes, vectors.ctypes, _int(n), support.ctypes,
@@ -66,9 +69,14 @@ def _int(value: int) -> Any:
 
 @cache
 def _syevr() -> Any:
-    """The function of LAPACK that SciPy carries, as ctypes calls it: without the lock."""
+    """The function of LAPACK that SciPy carries, as ctypes calls it: without the lock.
+
+    None where SciPy was built with whole numbers of 64 bits, as some distributions may from 1.18 on.
+    """
     prototype = ctypes.PYFUNCTYPE(ctypes.c_void_p, ctypes.py_object, ctypes.c_char_p)
     signature = LowLevelCallable.from_cython(cython_lapack, "ssyevr").signature
+    if signature.count(" int *") != WHOLE:
+        return None
     address = prototype(("PyCapsule_GetPointer", ctypes.pythonapi))(
         cython_lapack.__pyx_capi__["ssyevr"], signature.encode()
     )
