@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from typing import Protocol
 
 import numpy as np
@@ -18,6 +19,8 @@ LARGE = 200_000
 CELLS_PER_LENGTH = 2.0
 """Cells in a row along the smoothing length."""
 LEAST_CELLS = 4_000
+KEPT = 4
+"""Flows of a mesh that are kept: of labels, of regions, of sides, and one more."""
 
 
 class _Factor(Protocol):
@@ -62,3 +65,20 @@ class HeatFlow:
         """(n, k) values at vertices, averaged over the surface within about the length."""
         smooth = self._factor.solve(self._mass @ values.astype(self._mass.dtype))
         return np.asarray(smooth if self._prolongation is None else self._prolongation @ smooth)
+
+
+class Flows:
+    """The heat flows of one mesh by length, each factored once; the last few are kept."""
+
+    def __init__(self, mesh: TriangleMesh) -> None:
+        self._mesh = mesh
+        self._kept: OrderedDict[float, HeatFlow] = OrderedDict()
+
+    def over(self, length: float) -> HeatFlow:
+        """The flow over a length."""
+        if length not in self._kept:
+            self._kept[length] = HeatFlow(self._mesh, length)
+        self._kept.move_to_end(length)
+        while len(self._kept) > KEPT:
+            self._kept.popitem(last=False)
+        return self._kept[length]
