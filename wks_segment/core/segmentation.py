@@ -50,7 +50,7 @@ little, and tiny loose parts take no part in low energies."""
 MOST_SMOOTHNESS = 10
 MAX_SAMPLES = 20_000
 """Vertices that take part in the mixture, spread evenly by area where there are more."""
-MOST_NUMBERS = 40_000_000
+MOST_NUMBERS = 3_000_000
 """Posteriors of components at vertices that are kept at most; above that only those of segments are computed."""
 PAPER: dict[str, Any] = {
     "covariance_type": "diag", "scaling": "raw", "laplacian": "cotangent", "smoothness": 0.0,

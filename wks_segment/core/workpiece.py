@@ -77,4 +77,4 @@ class Workpiece:
     @cached_property
     def curvature(self) -> FloatArray:
         """(p,) curvature from one of these to the next."""
-        return coarse_curvature(self.surface, self.neighbours)
+        return coarse_curvature(self.surface, self.neighbours, self.flows)
