@@ -20,6 +20,8 @@ from scipy.sparse import coo_matrix
 import wks_segment.blender
 from benchmarks.speed import table_row
 from wks_segment.blender import files, tasks
+from wks_segment.blender.report import Report
+from wks_segment.blender.training import read_training_poses
 from wks_segment.core import PoseSegmentation
 from wks_segment.core.mesh import FloatArray, IntArray
 
@@ -52,18 +54,18 @@ def agreements(path: Path) -> list[float]:
     (objects,) = files.open_files([path])
     for obj in objects:
         obj.select_set(obj.type == "MESH")
-    settings, report = bpy.context.scene.wks_segment, tasks.Report([])
-    poses = tasks.read_training_poses(bpy.context, settings, report)
+    settings, report = bpy.context.scene.wks_segment, Report([])
+    poses = read_training_poses(bpy.context, settings, report)
     polygons, rest = [pose.polygon_of for pose in poses], poses[0].upright
     eight = settings.new_model()
     described = tasks.describe(eight, poses, report, lambda stage, share: None)
     eight.fit(described, rest=rest)
-    areas = np.bincount(polygons[0], poses[0].mesh.face_areas)
+    areas = np.bincount(polygons[0], poses[0].mesh.face_areas).astype(np.float64)
     found = []
     for number in NUMBERS:
         fresh = PoseSegmentation(number).fit(described, rest=rest)
-        labels = [model.segment_polygons(described, polygons) for model in (eight.with_segments(number), fresh)]
-        found.append(alike(*labels, areas))
+        ours, theirs = (model.segment_polygons(described, polygons) for model in (eight.with_segments(number), fresh))
+        found.append(alike(ours, theirs, areas))
     return found
 
 
