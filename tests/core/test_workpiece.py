@@ -102,12 +102,11 @@ def test_regions_are_those_of_the_new_number_where_poses_are_given(model, descri
 
 
 def test_sides_are_told_with_the_regions_that_were_learned(model, described):
-    few = model.with_segments(4)
+    few, faces = model.with_segments(4), np.arange(POSES[0].n_faces)
     for pose in described:
-        labels = few.segment_polygons([pose], POLYGONS[:1])
-        side = few.polygon_sides(pose, POLYGONS[0], labels)
-        usual = model.polygon_sides(pose, POLYGONS[0], labels)
-        np.testing.assert_array_equal(side, usual)
+        labels = few.segment_polygons([pose], [faces])
+        side = few.polygon_sides(pose, faces, labels)
+        np.testing.assert_array_equal(side, model.polygon_sides(pose, faces, labels))
         assert {-1, 1} <= set(side)
 
 

@@ -51,7 +51,15 @@ class _Sidebar:
         self.settings(context, "live")
         if not session.holds(context.scene):
             return
+        row = self.layout.row()
+        row.use_property_split, row.enabled = True, settings.live
+        row.prop(settings, "preview")
         column = self.layout.column(align=True)
+        if session.proposed is not None:
+            row = column.row(align=True)
+            row.operator("wks_segment.accept", icon="CHECKMARK")
+            row.operator("wks_segment.discard", icon="X")
+            return
         slow = session.seconds > LIVE_SECONDS
         if settings.live and slow:
             for line in wrapped(f"Labels take {session.seconds:.0f} seconds here, too long to follow by themselves"):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import count
 from typing import TYPE_CHECKING, Any
 
@@ -12,16 +14,20 @@ from bpy.app.handlers import persistent
 from ..core import MemoryCache
 from .errors import ChangedError, UserError
 from .jobs import desk_of, redraw
+from .preview import Preview
 
 if TYPE_CHECKING:
+    from .settings import WKSSegmentSettings
     from .work import Work
 
 HOLDER = "wks_segment_session"
 """Name of the session at the type of Blender's window manager."""
 REST = 0.1
 """Seconds for which settings must have rested."""
-LIVE_SECONDS = 3.0
+LIVE_SECONDS = 5.0
 """Labels that took longer the last time do not follow by themselves."""
+LIVE = ("n_segments", "auto_segments", "sides", "smoothness", "min_share", "snap_to")
+"""Settings that labels follow."""
 NOTHING = "Nothing was learned or applied since this file was opened, or it was undone"
 MOST_BYTES = 1_000_000_000
 """Signatures of a work that is kept, at most."""
@@ -38,6 +44,10 @@ class Session:
         self.work: Work | None = None
         self.said = ""
         """Why labels do not follow any more."""
+        self.proposed: tuple[str, Work] | None = None
+        """What labels would be with settings, until it is accepted or discarded."""
+        self.preview = Preview()
+        self._before: dict[str, Any] = {}
         self._numbers = count(1)
         self._name = ""
         self._due = 0.0
@@ -50,7 +60,9 @@ class Session:
         """Keep a work that was written to a scene."""
         if work.first is None:
             self._name = f"work {next(self._numbers)}"
+        self.withdraw()
         self.work, self.said = work, ""
+        self._before = _values(scene.wks_segment)
         if sum(each.pose.signature.nbytes for each in set(work.described)) > MOST_BYTES:
             self.drop()
         scene.wks_segment.applied = self._state(scene)
@@ -87,10 +99,13 @@ class Session:
             return None
         window = next(iter(context.window_manager.windows), None)
         try:
-            # One step for undo, as if a person had pressed the button.
-            with context.temp_override(window=window):
-                bpy.ops.wks_segment.update("EXEC_DEFAULT", True)
-        except RuntimeError as error:
+            if scene.wks_segment.preview:
+                self.propose(context)
+            else:
+                # One step for undo, as if a person had pressed the button.
+                with context.temp_override(window=window):
+                    bpy.ops.wks_segment.update("EXEC_DEFAULT", True)
+        except (RuntimeError, UserError) as error:
             self.said = str(error).removeprefix("Error: ").strip()
         redraw(context)
         return None
@@ -105,18 +120,53 @@ class Session:
         """
         if self.work is None:
             raise UserError(NOTHING)
-        try:
-            work = self.work.again(scene.wks_segment)
-            work.compute(lambda stage, share: None)
+        with self._dropping():
+            work = self._again(scene)
             work.write()
-        except ChangedError as error:
-            self.drop()
-            raise UserError(f"Segments do not follow any more, learn or apply again: {error}") from error
         self.keep(work, scene)
         return work
 
+    def propose(self, context: bpy.types.Context) -> None:
+        """Show in the viewport what `update` would write, and write nothing."""
+        scene = context.scene
+        with self._dropping():
+            work = self._again(scene)
+            self.proposed, self.said = (self._state(scene), work), ""
+            self.preview.show(context, work.labels)
+
+    def discard(self, scene: bpy.types.Scene) -> None:
+        """Take back what is proposed, and the settings that it is from."""
+        self.withdraw()
+        for name, value in self._before.items():
+            setattr(scene.wks_segment, name, value)
+
+    def withdraw(self) -> None:
+        """Show nothing that is not written."""
+        self.proposed = None
+        self.preview.hide()
+
+    def _again(self, scene: bpy.types.Scene) -> Work:
+        """The work with the settings as they are now, which may be what is proposed."""
+        if self.work is None:
+            raise UserError(NOTHING)
+        if self.proposed is not None and self.proposed[0] == self._state(scene):
+            return self.proposed[1]
+        work = self.work.again(scene.wks_segment)
+        work.compute(lambda stage, share: None)
+        return work
+
+    @contextmanager
+    def _dropping(self) -> Iterator[None]:
+        """Forget the work if the scene turns out to be another one."""
+        try:
+            yield
+        except ChangedError as error:
+            self.drop()
+            raise UserError(f"Segments do not follow any more, learn or apply again: {error}") from error
+
     def drop(self) -> None:
         """Forget the work."""
+        self.withdraw()
         self.work, self._name = None, ""
 
     def close(self) -> None:
@@ -130,9 +180,10 @@ class Session:
                 handlers.remove(function)
 
     def _state(self, scene: bpy.types.Scene) -> str:
-        settings = scene.wks_segment
-        values = settings.number(), settings.sides, settings.smoothness, settings.min_share, sorted(settings.snap_to)
-        return f"{self._name}:{values}"
+        values = _values(scene.wks_segment)
+        if values["auto_segments"]:
+            del values["n_segments"]
+        return f"{self._name}:{values | {'snap_to': sorted(values['snap_to'])}}"
 
     @persistent
     def _on_load(self, *_: Any) -> None:
@@ -141,10 +192,16 @@ class Session:
 
     @persistent
     def _on_undo(self, *_: Any) -> None:
+        self.withdraw()
         if self.work is None:
             return
         if any(member.found() is None for pose in self.work.poses for member in pose.character.members):
             self.drop()
+
+
+def _values(settings: WKSSegmentSettings) -> dict[str, Any]:
+    """Of the settings that labels follow."""
+    return {name: getattr(settings, name) for name in LIVE}
 
 
 def session_of(context: bpy.types.Context) -> Session:

@@ -51,7 +51,6 @@ TUNED: dict[str, dict[str, Any]] = {
     },
 }  # fmt: skip
 """Settings that labels follow at once, in the sidebar and where an operator is adjusted."""
-LIVE = (*TUNED, "snap_to")
 MODEL_PARAMETERS = (
     "n_segments", "n_eigenpairs", "n_energies", "covariance_type", "scaling", "random_state", "pieces",
     "laplacian", "smoothness", "preset",
@@ -110,6 +109,13 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         description="Where the paper's setting begins its search. Otherwise nothing depends on luck, nor on this",
         default=0, min=0,
     )  # fmt: skip
+    preview: BoolProperty(
+        name="Preview",
+        description="Show in the viewport what segments would be, and write them only when they are accepted. "
+        "Needs Live",
+        default=False,
+        update=changed,
+    )
     n_eigenpairs: IntProperty(
         name="Eigenpairs",
         description="How much detail the signature sees. Fewer are faster and coarser",

@@ -51,6 +51,8 @@ class Work:
         What is known of each pose, once it was computed.
     first : Work, optional
         What this one is a change of.
+    labels
+        The part of each polygon of each character, once it was computed.
     """
 
     model: PoseSegmentation
@@ -63,7 +65,7 @@ class Work:
     cache: SignatureCache
     described: list[Workpiece] = field(default_factory=list)
     first: Work | None = None
-    _labels: dict[Character, IntArray] = field(default_factory=dict)
+    labels: dict[Character, IntArray] = field(default_factory=dict)
     _soft: dict[Character, dict[int, FloatArray]] | None = None
 
     @classmethod
@@ -116,7 +118,7 @@ class Work:
         model.smoothness = settings.smoothness
         with report.stage("read"):
             wanted = Wanted.of(settings, [pose.character for pose in first.poses])
-        return replace(first, model=model, wanted=wanted, report=report, first=first, _labels={}, _soft=None)
+        return replace(first, model=model, wanted=wanted, report=report, first=first, labels={}, _soft=None)
 
     def compute(self, progress: Progress) -> None:
         """Describe, learn if that is the work, label; UserError if the core refuses. Fit for a thread."""
@@ -135,15 +137,15 @@ class Work:
             self.described = tasks.learn(model, poses, report, describing, self.cache)
         elif not self.described:
             self.described = tasks.describe(model, poses, report, describing, cache=self.cache)
-        self._labels = tasks.label(model, poses, self.described, wanted, report, labelling)
-        self._soft = tasks.soften(model, poses, self.described, self._labels, wanted, report, softening)
+        self.labels = tasks.label(model, poses, self.described, wanted, report, labelling)
+        self._soft = tasks.soften(model, poses, self.described, self.labels, wanted, report, softening)
         if self.learns:
             report.warnings += segment_warnings(model, report)
 
     def write(self) -> None:
         """Write labels, and a learned model; ChangedError, and nothing written, if what was read has changed."""
         self.watch.look()
-        tasks.write(self._labels, self.wanted, self.report, self._soft)
+        tasks.write(self.labels, self.wanted, self.report, self._soft)
         settings = self.watch.scene().wks_segment
         if self.learns:
             names = list(dict.fromkeys(pose.character.name for pose in self.poses))
