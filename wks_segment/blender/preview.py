@@ -11,6 +11,7 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from ..core.mesh import FloatArray, IntArray
+from ..core.surface import indicator
 from . import poses as reader
 from .characters import Character
 from .style import PLAIN, Style
@@ -41,13 +42,15 @@ def picture(
         pose = reader.read_pose(context, character, character.name)
         mesh, polygon_of = pose.mesh, pose.polygon_of
         known = np.flatnonzero((polygon_of >= 0) & (polygon_of < len(parts)))
-        corners = mesh.vertices[mesh.faces[known]]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+        faces = mesh.faces[known]
+        a, b, c = (mesh.vertices[faces[:, i]] for i in range(3))
+        normals = np.cross(b - a, c - a)
+        at_vertices = indicator(faces.ravel(), mesh.n_vertices) @ np.repeat(normals, 3, axis=0)
         # Both sides are lit, since faces may be turned inside out.
-        shade = DARKEST + (1 - DARKEST) * np.abs(normals @ (LIGHT / np.linalg.norm(LIGHT)))
+        shade = DARKEST + (1 - DARKEST) * np.abs(_unit(normals) @ (LIGHT / np.linalg.norm(LIGHT)))
         size = float(np.ptp(mesh.vertices, axis=0).max())
-        places.append((corners + OFFSET * size * normals[:, None]).reshape(-1, 3))
+        # Along the normals of vertices, or gaps would open between faces.
+        places.append((mesh.vertices + OFFSET * size * _unit(at_vertices))[faces].reshape(-1, 3))
         of_faces = np.ones((len(known), 4))
         of_faces[:, :3] = style.colors_of(parts[polygon_of[known]]) * shade[:, None]
         colors.append(np.repeat(of_faces, 3, axis=0))
@@ -96,6 +99,10 @@ class Preview:
         self._batch.draw(shader)
         gpu.state.depth_mask_set(False)
         gpu.state.depth_test_set("NONE")
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), np.finfo(float).tiny))
 
 
 def _redraw(context: bpy.types.Context) -> None:

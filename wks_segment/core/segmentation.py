@@ -357,9 +357,9 @@ class PoseSegmentation(PoseDescriber):
     ) -> PoseSegmentation:
         """The same model with another number of segments, at once: its components joined to as many groups.
 
-        A new fit may do better: it makes more components for more than eight segments, takes the mixture whose groups
-        agree best at this number, and joins no segment that is only crumbs. Labels are nearly the same up to eight
-        segments, see docs/method.md.
+        Not what a new fit gives: that makes more components for more than eight segments, takes the mixture whose
+        groups agree best at this number, and joins segments that are only crumbs at it. From eight to fewer segments
+        labels are much the same, to more they are others: docs/method.md has numbers.
 
         Parameters
         ----------
