@@ -37,9 +37,10 @@ class Ran:
 
     def __new__(cls, operator, **properties):
         said = []
-        own = {name: getattr(operator, name) for name in ("bl_label", "verb", "read")}
+        own = {name: getattr(operator, name) for name in ("bl_label", "verb", "learns", "read")}
         report = {"report": lambda self, kinds, text: said.append((*kinds, text)), "said": said, "confirmed": False}
-        return type("Ran", (RunsWork,), own | report | properties)()
+        plain = {"take": lambda self, settings: None, "is_adjusted": False}
+        return type("Ran", (RunsWork,), own | report | plain | properties)()
 
 
 @pytest.fixture

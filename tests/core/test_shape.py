@@ -13,6 +13,7 @@ from wks_segment.core.shape import (
     smooth_normals,
     vertex_normals,
 )
+from wks_segment.core.smoothing import Flows, HeatFlow
 
 AREA_OF_UNIT_SPHERE = 4 * np.pi
 
@@ -37,9 +38,9 @@ def test_faces_turn_outward_however_they_come():
 def test_a_sphere_is_as_thick_and_as_curved_as_its_radius(turned):
     sphere = icosphere(4)
     surface = prepare_surface(TriangleMesh(sphere.vertices, sphere.faces[:, ::-1]) if turned else sphere)
-    normals = smooth_normals(surface, vertex_normals(surface), FINE)
+    normals = smooth_normals(vertex_normals(surface), HeatFlow(surface.mesh, FINE))
     radius = 1 / np.sqrt(AREA_OF_UNIT_SPHERE)
-    np.testing.assert_allclose(np.exp(log_thickness(surface, normals)) - 0.003, radius, rtol=0.05)
+    np.testing.assert_allclose(np.exp(log_thickness(surface, normals, Flows(surface.mesh))) - 0.003, radius, rtol=0.05)
     np.testing.assert_allclose(curvature_across(surface, normals, adjacency_of(surface)), 1 / radius, rtol=0.15)
 
 
@@ -47,8 +48,8 @@ def test_a_sheet_is_thin_on_a_coarse_mesh_too():
     sphere = icosphere(3)
     sheet = TriangleMesh(sphere.vertices * (1, 1, 0.02), sphere.faces)
     surface = prepare_surface(sheet)
-    normals = smooth_normals(surface, vertex_normals(surface), FINE)
-    thickness = np.exp(log_thickness(surface, normals)) - 0.003
+    normals = smooth_normals(vertex_normals(surface), HeatFlow(surface.mesh, FINE))
+    thickness = np.exp(log_thickness(surface, normals, Flows(surface.mesh))) - 0.003
     middle = np.hypot(*sheet.vertices[:, :2].T) < 0.6
     assert np.median(thickness[middle]) * np.sqrt(sheet.area) < 0.03
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from . import command, operators, panel
+from . import command, operators, panel, session
 from .jobs import HOLDER, Desk
 from .settings import WKSSegmentSettings
 
@@ -23,14 +23,16 @@ def register() -> None:
         bpy.utils.register_class(cls)
     bpy.types.Scene.wks_segment = bpy.props.PointerProperty(type=WKSSegmentSettings)
     setattr(bpy.types.WindowManager, HOLDER, Desk())
+    setattr(bpy.types.WindowManager, session.HOLDER, session.Session())
     _commands.append(bpy.utils.register_cli_command(COMMAND, command.run))
 
 
 def unregister() -> None:
     """Called by Blender when the extension is disabled."""
     bpy.utils.unregister_cli_command(_commands.pop())
-    getattr(bpy.types.WindowManager, HOLDER).close()
-    delattr(bpy.types.WindowManager, HOLDER)
+    for holder in (session.HOLDER, HOLDER):
+        getattr(bpy.types.WindowManager, holder).close()
+        delattr(bpy.types.WindowManager, holder)
     del bpy.types.Scene.wks_segment
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

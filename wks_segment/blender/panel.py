@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 
 from .jobs import desk_of
+from .session import LIVE_SECONDS, session_of
 
 NO_MODEL = "No model yet:\nselect a character,\nthen Learn and Segment"
 WIDTH = 36
@@ -44,6 +45,30 @@ class _Sidebar:
         number.prop(settings, "n_segments")
         row.prop(settings, "auto_segments", toggle=True)
 
+    def live(self, context: bpy.types.Context) -> None:
+        """Show whether labels follow the settings, and if not, why, and how they can."""
+        settings, session = context.scene.wks_segment, session_of(context)
+        self.settings(context, "live")
+        if not session.holds(context.scene):
+            return
+        row = self.layout.row()
+        row.use_property_split, row.enabled = True, settings.live
+        row.prop(settings, "preview")
+        column = self.layout.column(align=True)
+        if session.proposed is not None:
+            row = column.row(align=True)
+            row.operator("wks_segment.accept", icon="CHECKMARK")
+            row.operator("wks_segment.discard", icon="X")
+            return
+        slow = session.seconds > LIVE_SECONDS
+        if settings.live and slow:
+            for line in wrapped(f"Labels take {session.seconds:.0f} seconds here, too long to follow by themselves"):
+                column.label(text=line)
+        for line in wrapped(session.said):
+            column.label(text=line)
+        if not session.follows(context.scene) and (slow or session.said or not settings.live):
+            column.operator("wks_segment.update", icon="FILE_REFRESH")
+
     def job(self, context: bpy.types.Context) -> None:
         """Show how far the running job is, or why the last one was ended."""
         desk = desk_of(context)
@@ -72,7 +97,9 @@ class WKS_SEGMENT_PT_main(_Sidebar, bpy.types.Panel):
             if settings.use_frame_range:
                 self.settings(context, "frame_first", "frame_last")
         self.segments(context)
-        self.settings(context, "sides", "n_eigenpairs", "n_energies", "covariance_type", "random_state")
+        self.settings(context, "sides")
+        self.live(context)
+        self.settings(context, "n_eigenpairs", "n_energies", "covariance_type", "random_state")
 
         column = self.layout.column(align=True)
         column.scale_y = 1.4

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
@@ -11,11 +11,55 @@ from ..core import PoseSegmentation
 from .certainty import certainty_lines
 from .errors import UserError
 from .palette import MAX_COLOURS
+from .session import session_of
 
+TUNED: dict[str, dict[str, Any]] = {
+    "n_segments": {
+        "name": "Segments",
+        "description": "Number of kinds of parts. Parts that look alike, as both hands, are one kind",
+        "default": 8, "min": 2, "max": MAX_COLOURS, "soft_max": 20,
+    },
+    "auto_segments": {
+        "name": "Automatic",
+        "description": "As many segments as the poses show surely, up to 16",
+        "default": False,
+    },
+    "sides": {
+        "name": "Sides",
+        "description": "Whether a part that is there on both sides, as a hand, is one part or two. Left is where X "
+        "points to when the character is at rest",
+        "items": [
+            ("one", "One Part for Both", "Both sides have the same number, name and color"),
+            (
+                "two",
+                "Left and Right",
+                "Names end in .L and .R, left is the lighter color. The number is 1000 more on the left and 2000 more "
+                "on the right. Not with the method of the paper",
+            ),
+        ],
+        "default": "one",
+    },
+    "smoothness": {
+        "name": "Smoothness",
+        "description": "How smooth the borders are. Zero leaves every vertex the label of its own signature",
+        "default": 1.0, "min": 0.0, "max": 10.0, "soft_max": 3.0, "precision": 2,
+    },
+    "min_share": {
+        "name": "Smallest Part",
+        "description": "A connected part below this share of the surface joins its neighbour",
+        "default": 0.5, "min": 0.0, "max": 20.0, "precision": 1, "subtype": "PERCENTAGE",
+    },
+}  # fmt: skip
+"""Settings that labels follow at once, in the sidebar and where an operator is adjusted."""
 MODEL_PARAMETERS = (
     "n_segments", "n_eigenpairs", "n_energies", "covariance_type", "scaling", "random_state", "pieces",
     "laplacian", "smoothness", "preset",
 )  # fmt: skip
+
+
+def changed(settings: WKSSegmentSettings, context: bpy.types.Context) -> None:
+    """Called by Blender when one of the settings that labels follow gets another value."""
+    session_of(context).mark(settings.id_data)
 
 
 class WKSSegmentSettings(bpy.types.PropertyGroup):
@@ -51,36 +95,27 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
     frame_first: IntProperty(name="First", description="First frame to take a pose from", default=1)
     frame_last: IntProperty(name="Last", description="Last frame to take a pose from", default=50)
 
-    n_segments: IntProperty(
-        name="Segments",
-        description="Number of kinds of parts. Parts that look alike, as both hands, are one kind",
-        default=8, min=2, max=MAX_COLOURS, soft_max=20,
-    )  # fmt: skip
-    auto_segments: BoolProperty(
-        name="Automatic",
-        description="As many segments as the poses show surely, up to 16",
-        default=False,
-    )
-    sides: EnumProperty(
-        name="Sides",
-        description="Whether a part that is there on both sides, as a hand, is one part or two. Left is where X points "
-        "to when the character is at rest",
-        items=[
-            ("one", "One Part for Both", "Both sides have the same number, name and color"),
-            (
-                "two",
-                "Left and Right",
-                "Names end in .L and .R, left is the lighter color. The number is 1000 more on the left and 2000 more "
-                "on the right. Not with the method of the paper",
-            ),
-        ],
-        default="one",
+    n_segments: IntProperty(**TUNED["n_segments"], update=changed)
+    auto_segments: BoolProperty(**TUNED["auto_segments"], update=changed)
+    sides: EnumProperty(**TUNED["sides"], update=changed)
+    live: BoolProperty(
+        name="Live",
+        description="Let labels follow a change of the number of segments, sides, smoothness, smallest part or "
+        "snapping at once, on what was learned or applied last. Not where that takes long",
+        default=True,
     )
     random_state: IntProperty(
         name="Seed",
         description="Where the paper's setting begins its search. Otherwise nothing depends on luck, nor on this",
         default=0, min=0,
     )  # fmt: skip
+    preview: BoolProperty(
+        name="Preview",
+        description="Show in the viewport what segments would be, and write them only when they are accepted. "
+        "Needs Live",
+        default=False,
+        update=changed,
+    )
     n_eigenpairs: IntProperty(
         name="Eigenpairs",
         description="How much detail the signature sees. Fewer are faster and coarser",
@@ -139,16 +174,8 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         ],
         default="default",
     )
-    smoothness: FloatProperty(
-        name="Smoothness",
-        description="How smooth the borders are. Zero leaves every vertex the label of its own signature",
-        default=1.0, min=0.0, max=10.0, soft_max=3.0, precision=2,
-    )  # fmt: skip
-    min_share: FloatProperty(
-        name="Smallest Part",
-        description="A connected part below this share of the surface joins its neighbour",
-        default=0.5, min=0.0, max=20.0, precision=1, subtype="PERCENTAGE",
-    )  # fmt: skip
+    smoothness: FloatProperty(**TUNED["smoothness"], update=changed)
+    min_share: FloatProperty(**TUNED["min_share"], update=changed)
     snap_to: EnumProperty(
         name="Snap Borders To",
         description="Edges that draw a border nearby to them. Needs some smoothness",
@@ -159,6 +186,7 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         ],
         options={"ANIMATABLE", "ENUM_FLAG"},
         default=set(),
+        update=changed,
     )
 
     limit_minutes: FloatProperty(
@@ -200,6 +228,12 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
     model: StringProperty(options={"HIDDEN"}, description="The learned model, as JSON")
     model_summary: StringProperty(options={"HIDDEN"}, description="Lines on what the model was learned from")
 
+    applied: StringProperty(options={"HIDDEN"}, description="What the labels in this scene are from, see `Session`")
+
+    def number(self) -> int | Literal["auto"]:
+        """Segments, as a model takes them."""
+        return "auto" if self.auto_segments else self.n_segments
+
     def new_model(self) -> PoseSegmentation:
         """An unfitted model with these settings; UserError if they exclude each other."""
         parameters: dict[str, Any] = {name: getattr(self, name) for name in MODEL_PARAMETERS}
@@ -214,4 +248,5 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
 
     def keep_model(self, model: PoseSegmentation, summary: list[str]) -> None:
         """Store a fitted model in the scene, with a few lines on where it is from and its number of segments."""
+        self.applied = ""
         self.model, self.model_summary = model.to_json(), "\n".join([*summary, *certainty_lines(model)])

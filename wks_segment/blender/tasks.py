@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..core import Connection, PoseSegmentation, PoseSignature, SpectrumError, SpectrumWarning, connect
+from ..core import Connection, PoseSegmentation, SignatureCache, SpectrumError, SpectrumWarning, Workpiece, connect
 from ..core.description import Progress
 from ..core.memory import available_memory
 from ..core.mesh import FloatArray, IntArray
@@ -82,8 +82,11 @@ def check_limits(model: PoseSegmentation, poses: Sequence[Pose], settings: WKSSe
     )
 
 
-def learn(model: PoseSegmentation, poses: Sequence[Pose], report: Report, progress: Progress) -> list[PoseSignature]:
-    """Fit a model to poses; the signature of each pose.
+def learn(
+    model: PoseSegmentation, poses: Sequence[Pose], report: Report, progress: Progress,
+    cache: SignatureCache | None = None,
+) -> list[Workpiece]:  # fmt: skip
+    """Fit a model to poses; what is known of each pose.
 
     Raises
     ------
@@ -96,7 +99,7 @@ def learn(model: PoseSegmentation, poses: Sequence[Pose], report: Report, progre
             f'"{poses[0].character.name}" has {most} faces, too few for {model.n_segments} segments: '
             "take fewer segments, or subdivide it"
         )
-    described = describe(model, poses, report, progress, share=DESCRIBED)
+    described = describe(model, poses, report, progress, DESCRIBED, cache)
     with report.stage("mixture"):
         try:
             model.fit(described, lambda stage, share: progress("Learning the segments", share), poses[0].upright)
@@ -107,9 +110,13 @@ def learn(model: PoseSegmentation, poses: Sequence[Pose], report: Report, progre
 
 
 def describe(
-    model: PoseSegmentation, poses: Sequence[Pose], report: Report, progress: Progress, share: float = 1.0
-) -> list[PoseSignature]:
-    """Signature of each pose; poses that are one and the same surface are computed once."""
+    model: PoseSegmentation, poses: Sequence[Pose], report: Report, progress: Progress, share: float = 1.0,
+    cache: SignatureCache | None = None,
+) -> list[Workpiece]:  # fmt: skip
+    """Signature of each pose, to be labelled; poses that are one and the same surface are computed once.
+
+    What is in the cache is not computed at all.
+    """
     same = [next((j for j in range(i) if pose.is_like(poses[j])), i) for i, pose in enumerate(poses)]
     new = [i for i, first in enumerate(same) if first == i]
     with report.stage("connect"):
@@ -134,6 +141,7 @@ def describe(
                     [connections[i] for i in new],
                     lambda stage, done: progress(f"Signature of {stage}", share * done),
                     [f'"{poses[i].name}"' for i in new],
+                    cache=cache,
                 )
         except (ValueError, SpectrumError, MemoryError) as error:
             raise UserError(str(error)) from error
@@ -144,13 +152,13 @@ def describe(
         for warning in said:
             if not issubclass(warning.category, SpectrumWarning):
                 warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
-    of = dict(zip(new, described, strict=True))
-    report.laplacians = [of[first].laplacian for first in same]
+    of = dict(zip(new, map(Workpiece, described), strict=True))
+    report.laplacians = [of[first].pose.laplacian for first in same]
     return [of[first] for first in same]
 
 
 def label(
-    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[PoseSignature],
+    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[Workpiece],
     wanted: Wanted, report: Report, progress: Progress,
 ) -> dict[Character, IntArray]:  # fmt: skip
     """Part of each of a character's polygons, agreed on by all of its poses, and by all objects that share a mesh."""
@@ -194,7 +202,7 @@ def label(
 
 
 def agreed_sides(
-    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[PoseSignature], segments: IntArray,
+    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[Workpiece], segments: IntArray,
     progress: Progress,
 ) -> IntArray:  # fmt: skip
     """(p,) side that most poses of a mesh give to each polygon: 1 left, −1 right, 0 neither; given the segments."""
@@ -207,7 +215,7 @@ def agreed_sides(
 
 
 def soften(
-    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[PoseSignature],
+    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[Workpiece],
     labels: dict[Character, IntArray], wanted: Wanted, report: Report, progress: Progress,
 ) -> dict[Character, dict[int, FloatArray]] | None:  # fmt: skip
     """For each part the weights of each character's vertices, agreed on as labels are.

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from ..core import PoseSegmentation, PoseSignature
+from ..core import PoseSegmentation, Workpiece
 from ..core.mesh import BoolArray, FloatArray, IntArray
 from ..core.surface import indicator
 from . import parts
@@ -31,7 +31,7 @@ def hard_weights(mesh: bpy.types.Mesh, labels: IntArray) -> dict[int, FloatArray
 
 
 def soft_weights(
-    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[PoseSignature], body: Body,
+    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[Workpiece], body: Body,
     tick: Callable[[float], None] | None = None,
 ) -> FloatArray:  # fmt: skip
     """(n, n_segments) mean posterior, over poses of the same meshes, at each of the character's own vertices.

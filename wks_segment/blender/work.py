@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import bpy
 
-from ..core import PoseSegmentation
+from ..core import PoseSegmentation, SignatureCache, Workpiece
 from ..core.description import Progress
 from ..core.mesh import FloatArray, IntArray
 from . import poses as reader
 from . import tasks
 from .characters import Character, group, mesh_objects
+from .errors import UserError
 from .poses import Pose
 from .report import Report, segment_warnings
+from .session import session_of
+from .settings import WKSSegmentSettings
 from .tasks import Wanted
 from .training import read_training_poses
 from .watch import Watch
@@ -39,6 +44,16 @@ class Work:
     report : Report
     learns : bool
         Whether the model is learned from the poses, and kept in the scene.
+    number : int or "auto"
+        Segments that the settings asked for when the model was there.
+    cache : SignatureCache
+        Asked for signatures, and told of new ones.
+    described
+        What is known of each pose, once it was computed.
+    first : Work, optional
+        What this one is a change of.
+    labels
+        The part of each polygon of each character, once it was computed.
     """
 
     model: PoseSegmentation
@@ -47,7 +62,11 @@ class Work:
     watch: Watch
     report: Report
     learns: bool
-    _labels: dict[Character, IntArray] = field(default_factory=dict)
+    number: int | Literal["auto"]
+    cache: SignatureCache
+    described: list[Workpiece] = field(default_factory=list)
+    first: Work | None = None
+    labels: dict[Character, IntArray] = field(default_factory=dict)
     _soft: dict[Character, dict[int, FloatArray]] | None = None
 
     @classmethod
@@ -74,7 +93,33 @@ class Work:
         with report.stage("read"):
             characters = [pose.character for pose in poses]
             wanted, watch = Wanted.of(context.scene.wks_segment, characters), Watch(context.scene, characters)
-        return cls(model, poses, wanted, watch, report, learns)
+        number, cache = context.scene.wks_segment.number(), session_of(context).cache
+        return cls(model, poses, wanted, watch, report, learns, number, cache)
+
+    def again(self, settings: WKSSegmentSettings) -> Work:
+        """The same poses and model with other settings, so that there are only labels to find.
+
+        Raises
+        ------
+        UserError
+            If this takes another model, or the scene has changed.
+        """
+        first, number = self.first or self, settings.number()
+        first.watch.glance()
+        report = Report(first.poses, first.report.laplacians)
+        model = copy(first.model)
+        if number != first.number:
+            # Without sides nobody asks for regions, and those that were learned will do.
+            poses = first.described if first.learns and settings.sides == "two" else []
+            try:
+                with report.stage("regroup"):
+                    model = first.model.with_segments(number, poses, first.poses[0].upright)
+            except ValueError as error:
+                raise UserError(f"This number of segments takes a new Learn and Segment: {error}") from error
+        model.smoothness = settings.smoothness
+        with report.stage("read"):
+            wanted = Wanted.of(settings, [pose.character for pose in first.poses])
+        return replace(first, model=model, wanted=wanted, report=report, first=first, labels={}, _soft=None)
 
     def compute(self, progress: Progress) -> None:
         """Describe, learn if that is the work, label; UserError if the core refuses. Fit for a thread."""
@@ -90,18 +135,25 @@ class Work:
             progress(stage, begun + (1 - begun) * (LABELLED + (1 - LABELLED) * share))
 
         model, poses, wanted, report = self.model, self.poses, self.wanted, self.report
-        step = tasks.learn if self.learns else tasks.describe
-        described = step(model, poses, report, describing)
-        self._labels = tasks.label(model, poses, described, wanted, report, labelling)
-        self._soft = tasks.soften(model, poses, described, self._labels, wanted, report, softening)
+        if not self.described and self.learns:
+            self.described = tasks.learn(model, poses, report, describing, self.cache)
+        elif not self.described:
+            self.described = tasks.describe(model, poses, report, describing, cache=self.cache)
+        self.labels = tasks.label(model, poses, self.described, wanted, report, labelling)
+        self._soft = tasks.soften(model, poses, self.described, self.labels, wanted, report, softening)
         if self.learns:
             report.warnings += segment_warnings(model, report)
 
     def write(self) -> None:
         """Write labels, and a learned model; ChangedError, and nothing written, if what was read has changed."""
         self.watch.look()
-        tasks.write(self._labels, self.wanted, self.report, self._soft)
+        tasks.write(self.labels, self.wanted, self.report, self._soft)
+        settings = self.watch.scene().wks_segment
         if self.learns:
             names = list(dict.fromkeys(pose.character.name for pose in self.poses))
             origin = f"From {', '.join(names[:3])}{' …' * (len(names) > 3)}"
-            self.watch.scene().wks_segment.keep_model(self.model, [origin, *self.report.facts[:3]])
+            settings.keep_model(self.model, [origin, *self.report.facts[:3]])
+        elif self.first is not None:
+            # Or what is applied next would not have the segments that are seen.
+            origin = settings.model_summary.partition("\n")[0]
+            settings.keep_model(self.model, [origin, f"{self.model.n_segments_} segments"])

@@ -1,26 +1,32 @@
 """The method, without Blender: mesh → surface → laplacian → spectrum → signature → mixture → regions → segmentation."""
 
-from .description import PoseSignature
+from .cache import DiskCache, MemoryCache, SignatureCache
 from .intrinsic import delaunay
 from .laplacian import mass_matrix, stiffness_matrix
 from .mesh import TriangleMesh
 from .mixture import GaussianMixture, fit_mixture
 from .model_file import ModelFileError
+from .pose_signature import PoseSignature
 from .segmentation import PoseSegmentation
 from .signature import heat_kernel_signature, wave_kernel_signature
 from .spectrum import SpectrumError, SpectrumWarning, eigenpairs
 from .surface import Connection, Surface, connect, prepare_surface
+from .workpiece import Workpiece
 
 __all__ = [
     "Connection",
+    "DiskCache",
     "GaussianMixture",
+    "MemoryCache",
     "ModelFileError",
     "PoseSegmentation",
     "PoseSignature",
+    "SignatureCache",
     "SpectrumError",
     "SpectrumWarning",
     "Surface",
     "TriangleMesh",
+    "Workpiece",
     "connect",
     "delaunay",
     "eigenpairs",

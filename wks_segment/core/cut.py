@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 from .mesh import BoolArray, FloatArray, IntArray
 from .regions import FaceAdjacency
 from .shape import COARSE, curvature_across, smooth_normals, vertex_normals
+from .smoothing import Flows
 from .surface import Surface
 
 CREASE, MOST_CONCAVE, MOST_CONVEX = 0.05, 15.0, 0.0
@@ -44,8 +45,16 @@ def crease_weights(surface: Surface, adjacency: FaceAdjacency, crease: float = C
 
     For `cut_borders`; where marked edges are to attract borders, to be multiplied by a number below 1 there.
     """
-    normals = smooth_normals(surface, vertex_normals(surface), COARSE)
-    curvature = curvature_across(surface, normals, adjacency)
+    return weights_of_curvature(coarse_curvature(surface, adjacency, Flows(surface.mesh)), crease)
+
+
+def coarse_curvature(surface: Surface, adjacency: FaceAdjacency, flows: Flows) -> FloatArray:
+    """(p,) curvature of a surface of area 1 from one original face to its neighbour, but for what is small."""
+    return curvature_across(surface, smooth_normals(vertex_normals(surface), flows.over(COARSE)), adjacency)
+
+
+def weights_of_curvature(curvature: FloatArray, crease: float = CREASE) -> FloatArray:
+    """(p,) weight of borders across which a surface is curved, as `crease_weights` has it."""
     return np.asarray(np.exp(crease * np.clip(curvature, -MOST_CONCAVE, MOST_CONVEX)))
 
 

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import os
 import threading
+import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
-from dataclasses import dataclass
 from typing import Literal
 
 from threadpoolctl import threadpool_limits
 
+from .cache import SignatureCache, signature_key
 from .intrinsic import Laplacian, better_triangles
 from .memory import available_memory
-from .mesh import FloatArray, TriangleMesh
+from .mesh import TriangleMesh
+from .pose_signature import PoseSignature
 from .signature import wave_kernel_signature_of
 from .spectrum import Accuracy, SpectrumError, memory_needed, seconds_needed
-from .surface import Connection, Pieces, Surface, connect_alike, prepare_surface
+from .surface import Connection, Pieces, connect, connect_alike, prepare_surface
 
 Progress = Callable[[str, float], None]
 """Called with the stage and the fraction of the whole that is done, 0 to 1. An error that it raises ends the work."""
@@ -29,27 +31,6 @@ PROGRESS_SECONDS = 0.1
 """Time between two reports of progress."""
 BESIDE_EIGENPAIRS = 1.5
 """Time of the whole job in that of its eigenpairs, about."""
-
-
-@dataclass(frozen=True)
-class PoseSignature:
-    """One pose, described: what takes the time, to be computed once and used for learning and labelling.
-
-    Attributes
-    ----------
-    surface : Surface
-        The welded and refined surface, with n' vertices.
-    signature : (n', n_energies) array of float
-    n_eigenpairs : int
-        What it was computed from.
-    laplacian : "cotangent" or "delaunay"
-        The triangles that it was computed on.
-    """
-
-    surface: Surface
-    signature: FloatArray
-    n_eigenpairs: int
-    laplacian: Laplacian = "cotangent"
 
 
 class PoseDescriber:
@@ -73,6 +54,7 @@ class PoseDescriber:
         mesh: TriangleMesh,
         connection: Connection | None = None,
         progress: Callable[[float], None] | None = None,
+        cache: SignatureCache | None = None,
     ) -> PoseSignature:
         """Compute the signature of one pose, to pass it to the other methods in the place of the mesh.
 
@@ -84,6 +66,8 @@ class PoseDescriber:
             `connect(*poses)` of all poses of the same mesh, so that it is one surface in all of them.
         progress : callable, optional
             Called with the share of the work that is done, 0 to 1. An error that it raises ends the work.
+        cache : SignatureCache, optional
+            Asked first, and told in the end.
 
         Raises
         ------
@@ -95,11 +79,31 @@ class PoseDescriber:
             If they would need more memory than is free; the message says how much.
         """
         self._check_parameters()
-        surface = prepare_surface(mesh, VERTICES_PER_PAIR * self.n_eigenpairs, connection, self.pieces)
+        connection = connection or connect(mesh, pieces=self.pieces)
+        key = "" if cache is None else signature_key(mesh, connection, self._describing())
+        known = None if cache is None else cache.get(key)
+        if known is not None:
+            return known
+        surface = prepare_surface(mesh, VERTICES_PER_PAIR * self.n_eigenpairs, connection)
         n_pairs = self.n_eigenpairs + surface.n_components - 1
         mesh, laplacian = better_triangles(surface.mesh, self._laplacian())
         signature = wave_kernel_signature_of(mesh, n_pairs, self.n_energies, self.accuracy, progress)
-        return PoseSignature(surface, signature, self.n_eigenpairs, laplacian)
+        described = PoseSignature(surface, signature, self.n_eigenpairs, laplacian)
+        if cache is not None:
+            try:
+                cache.put(key, described)
+            except OSError as error:
+                warnings.warn(f"a signature was not kept for the next time: {error}", stacklevel=2)
+        return described
+
+    def _describing(self) -> dict[str, str | int]:
+        """What a signature depends on, beside the mesh and what is one surface of it."""
+        return {
+            "n_eigenpairs": self.n_eigenpairs,
+            "n_energies": self.n_energies,
+            "accuracy": self.accuracy,
+            "laplacian": self._laplacian(),
+        }
 
     def describe_all(
         self,
@@ -108,6 +112,7 @@ class PoseDescriber:
         progress: Progress | None = None,
         names: Sequence[str] | None = None,
         workers: int | None = None,
+        cache: SignatureCache | None = None,
     ) -> list[PoseSignature]:
         """`describe` several poses, side by side where there are cores and memory for it.
 
@@ -123,6 +128,8 @@ class PoseDescriber:
             What to call each pose in messages; "pose 1" and so on if not given.
         workers : int, optional
             How many poses at once; as many as there are cores and memory for if not given, at most four.
+        cache : SignatureCache, optional
+            Asked first, and told of each pose as soon as it is done.
 
         Raises
         ------
@@ -141,7 +148,7 @@ class PoseDescriber:
                     raise CancelledError
 
             try:
-                return self.describe(meshes[i], each[i], tick)
+                return self.describe(meshes[i], each[i], tick, cache)
             except (ValueError, SpectrumError, MemoryError) as error:
                 kind = next(kind for kind in (MemoryError, SpectrumError, ValueError) if isinstance(error, kind))
                 raise kind(f"{called[i]}: {error}") from error

@@ -39,6 +39,9 @@ class _Front:
     outside: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
 
+Dissection = tuple[IntArray, list[_Front]]
+
+
 class NestedDissectionFactor:
     """L D Lᵀ = P A Pᵀ of a sparse symmetric matrix whose graph lies in space, D of one dense block a front.
 
@@ -53,6 +56,8 @@ class NestedDissectionFactor:
         Where the unknowns lie; neighbours in the matrix should be near to each other.
     dtype : float32 or float64
         Precision of the factors and of `solve`.
+    dissection : optional
+        What `nested_dissection` gave for a matrix with entries at the same places.
 
     Attributes
     ----------
@@ -66,10 +71,16 @@ class NestedDissectionFactor:
         If a front has no inverse in this precision.
     """
 
-    def __init__(self, matrix: csr_matrix, positions: FloatArray, dtype: type[Any] = np.float32) -> None:
+    def __init__(
+        self,
+        matrix: csr_matrix,
+        positions: FloatArray,
+        dtype: type[Any] = np.float32,
+        dissection: Dissection | None = None,
+    ) -> None:
         self.dtype = dtype
         self.n_negative = 0
-        self._order, fronts = nested_dissection(csr_matrix(matrix), positions)
+        self._order, fronts = dissection or nested_dissection(csr_matrix(matrix), positions)
         lower = tril(csr_matrix(matrix)[self._order][:, self._order], format="csc").astype(dtype)
         lower.sort_indices()
         place = np.empty(lower.shape[0], dtype=np.int64)
@@ -123,7 +134,7 @@ def _inverse(block: FloatArray) -> tuple[FloatArray, int]:
         raise SingularError(f"a front of {len(block)} unknowns has no inverse") from error
 
 
-def nested_dissection(matrix: csr_matrix, positions: FloatArray) -> tuple[IntArray, list[_Front]]:
+def nested_dissection(matrix: csr_matrix, positions: FloatArray) -> Dissection:
     """Order of elimination in which small separators come after the halves that they separate, and its fronts."""
     indptr, indices = matrix.indptr, matrix.indices
     side = np.zeros(matrix.shape[0], dtype=np.int8)

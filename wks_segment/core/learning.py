@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from .description import PoseSignature
 from .grouping import Contacts, Ground, Grouping
 from .mesh import FloatArray, IntArray
 from .mixture import CovarianceType, GaussianMixture, TooFewSamplesError, drawn_evenly, fit_mixtures
+from .pose_signature import PoseSignature
 from .regions import connected_regions
 from .smoothing import HeatFlow
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -67,6 +69,16 @@ class TriangleMesh:
             moved[place] = vertices
             vertices, faces, links = moved, place[faces], place[links]
         return TriangleMesh(vertices, faces, links, lengths, self.layers)
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """All that the mesh is; see `of_arrays`."""
+        arrays = {"vertices": self.vertices, "faces": self.faces, "links": self.links, "layers": np.array(self.layers)}
+        return arrays if self._lengths is None else {**arrays, "lengths": self._lengths}
+
+    @classmethod
+    def of_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> TriangleMesh:
+        """From what `arrays` gave; KeyError or ValueError if it is not that."""
+        return cls(arrays["vertices"], arrays["faces"], arrays["links"], arrays.get("lengths"), int(arrays["layers"]))
 
     @property
     def n_vertices(self) -> int:

@@ -23,7 +23,7 @@ from .laplacian import unit_area_masses
 from .mesh import FloatArray, IntArray, TriangleMesh
 from .regions import FaceAdjacency, connected_regions
 from .shape import outward
-from .smoothing import HeatFlow
+from .smoothing import Flows
 from .surface import Surface
 
 FIELDS = 6
@@ -79,9 +79,10 @@ class Regions:
         order = np.append(np.sort(largest), np.setdiff1d(np.arange(len(segment_of)), largest))
         return cls(np.argsort(order)[region], segment_of[np.sort(largest)])
 
-    def traits(self, surface: Surface, fields: FloatArray) -> Traits:
+    def traits(self, surface: Surface, fields: FloatArray, flows: Flows) -> Traits:
         """What tells the r largest apart in a pose, given the (n', FIELDS) fields on its surface."""
-        return Traits.of(surface, fields, np.where(self.region < len(self.segment), self.region, -1), self.segment)
+        large = np.where(self.region < len(self.segment), self.region, -1)
+        return Traits.of(surface, fields, large, self.segment, flows)
 
     def centres(self, mesh: TriangleMesh) -> FloatArray:
         """(r, 3) centre of each of the r largest in units of the square root of the area; x from the middle."""
@@ -125,7 +126,7 @@ class Traits:
     distance: FloatArray
 
     @classmethod
-    def of(cls, surface: Surface, fields: FloatArray, region: IntArray, segment: IntArray) -> Traits:
+    def of(cls, surface: Surface, fields: FloatArray, region: IntArray, segment: IntArray, flows: Flows) -> Traits:
         """Describe regions of one pose.
 
         Parameters
@@ -138,13 +139,15 @@ class Traits:
             Region of each face, numbered 0, 1, …, r − 1; -1 for one of none.
         segment : (r,) int array
             Segment of each region.
+        flows : Flows
+            Of the surface.
         """
         mesh, original = surface.mesh, surface.original
         count = len(segment)
         area = np.bincount(region[region >= 0], original.face_areas[region >= 0], count) / original.area
         masses = unit_area_masses(mesh)
         inside = _at_vertices(surface, region, count)
-        heat = HeatFlow(mesh, REACH).smooth(inside).astype(np.float64)
+        heat = flows.over(REACH).smooth(inside).astype(np.float64)
         weighed = inside * masses[:, None]
         signature = weighed.T @ fields / np.maximum(weighed.sum(axis=0), LEAST_OVERLAP)[:, None]
         against = np.where(segment[:, None] == segment, -1.0, 0.0)
@@ -308,19 +311,24 @@ def _told_apart(x: FloatArray, opposite: IntArray) -> IntArray:
     return np.where((opposite[opposite] == np.arange(len(x))) & (np.abs(apart) > MIDDLE), np.sign(apart), 0).astype(int)
 
 
-def side_field(surface: Surface, region: IntArray, side: IntArray) -> FloatArray:
+def side_field(surface: Surface, region: IntArray, side: IntArray, flows: Flows) -> FloatArray:
     """(m,) 1 on the left to −1 on the right, by what is near; given each face's region and the side of each region.
 
     The share of heat from the left less that from the right, so that what is far from both, as a tail, is as clearly
     in the middle as what lies between them.
     """
     inside = _at_vertices(surface, region, len(side)) @ np.stack([side > 0, side < 0], axis=1).astype(np.float64)
-    left, right = np.maximum(HeatFlow(surface.mesh, SIDE_REACH).smooth(inside), 0).T
+    left, right = np.maximum(flows.over(SIDE_REACH).smooth(inside), 0).T
     return surface.to_faces(((left - right) / np.maximum(left + right, LEAST_OVERLAP))[:, None])[:, 0]
 
 
 def sides_of_parts(
-    surface: Surface, field: FloatArray, polygon_of: IntArray, labels: IntArray, least_share: float
+    surface: Surface,
+    field: FloatArray,
+    polygon_of: IntArray,
+    labels: IntArray,
+    least_share: float,
+    neighbours: FaceAdjacency,
 ) -> IntArray:
     """(p,) side of each polygon: 1 left, −1 right, 0 for those of parts without one of the same label opposite.
 
@@ -335,10 +343,11 @@ def sides_of_parts(
         Of the polygons.
     least_share : float
         Parts under this share of the area are on the side of what is next to them.
+    neighbours : FaceAdjacency
+        Of the polygons.
     """
     original = surface.original
-    adjacency = FaceAdjacency.of(surface.welded_faces, original.vertices).between_polygons(polygon_of)
-    part = connected_regions(labels, adjacency)
+    part = connected_regions(labels, neighbours)
     count = int(part.max()) + 1
     label_of = np.zeros(count, dtype=np.int64)
     label_of[part] = labels

@@ -7,6 +7,7 @@ descriptor" (2011).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from os import PathLike
 from typing import Any, Literal, get_args
 
@@ -15,22 +16,25 @@ from threadpoolctl import threadpool_limits
 
 from . import model_file
 from .cut import REGION_CREASE, REGION_WIDTH
-from .description import PoseDescriber, PoseSignature, Progress
+from .description import PoseDescriber, Progress
 from .grouping import Grouping
 from .intrinsic import Laplacian
-from .labelling import clean_labels
+from .labelling import PosedMesh
 from .laplacian import unit_area_masses
 from .learning import AUTO, MIN_SHARE, SMOOTHING_LENGTH, Candidates, fine_mixtures, of_one_mesh
 from .mesh import FloatArray, IntArray, TriangleMesh
 from .mixture import CovarianceType, GaussianMixture, drawn_evenly, fit_mixtures
+from .pose_signature import PoseSignature
 from .region_atlas import FIELDS, RegionAtlas, Regions, Traits, side_field, sides_of_parts
 from .regions import FaceAdjacency, connected_regions
-from .smoothing import HeatFlow
 from .spectrum import Accuracy
 from .surface import Pieces
+from .workpiece import Workpiece
 
 Scaling = Literal["log", "raw"]
 Preset = Literal["default", "paper"]
+AnyPose = TriangleMesh | PoseSignature | Workpiece
+"""A pose as methods take it: the more is known of it, the less is to be computed."""
 
 DESCRIBED = 0.2
 """Share of the work that is signatures."""
@@ -46,6 +50,8 @@ little, and tiny loose parts take no part in low energies."""
 MOST_SMOOTHNESS = 10
 MAX_SAMPLES = 20_000
 """Vertices that take part in the mixture, spread evenly by area where there are more."""
+MOST_NUMBERS = 3_000_000
+"""Posteriors of components at vertices that are kept at most; above that only those of segments are computed."""
 PAPER: dict[str, Any] = {
     "covariance_type": "diag", "scaling": "raw", "laplacian": "cotangent", "smoothness": 0.0,
 }  # fmt: skip
@@ -129,7 +135,7 @@ class PoseSegmentation(PoseDescriber):
 
     def fit(
         self,
-        meshes: Sequence[TriangleMesh | PoseSignature],
+        meshes: Sequence[AnyPose],
         progress: Progress | None = None,
         rest: TriangleMesh | None = None,
     ) -> PoseSegmentation:
@@ -161,7 +167,8 @@ class PoseSegmentation(PoseDescriber):
         new = {i: mesh for i, mesh in enumerate(meshes) if isinstance(mesh, TriangleMesh)}
         found = self.describe_all(list(new.values()), None, lambda stage, share: tick(stage, DESCRIBED * share))
         described = dict(zip(new, found, strict=True))
-        poses = [described.get(i) or self._described(mesh) for i, mesh in enumerate(meshes)]
+        works = [self._work(described.get(i, mesh)) for i, mesh in enumerate(meshes)]
+        poses = [work.pose for work in works]
         tick("mixture", DESCRIBED)
         weights = np.concatenate([unit_area_masses(pose.surface.mesh) for pose in poses])
         if self._least_components() > len(weights):
@@ -202,56 +209,55 @@ class PoseSegmentation(PoseDescriber):
             mixtures = fine_mixtures(samples, shares, wanted, types, self.n_segments == "auto", mixing)
             candidates = Candidates(poses, mixtures, self._standardised, self._number)
             self.mixture_, self.grouping_ = candidates.best(grouping)
-            self.regions_ = self._atlas(poses, rest, naming)
+            self.regions_ = self._atlas(works, rest, naming)
         tick("done", 1.0)
         return self
 
-    def predict(self, mesh: TriangleMesh | PoseSignature) -> IntArray:
+    def predict(self, mesh: AnyPose) -> IntArray:
         """(n,) segment of each vertex: the one with the highest posterior, as in the paper."""
         return np.asarray(self.predict_proba(mesh).argmax(axis=1))
 
-    def predict_proba(self, mesh: TriangleMesh | PoseSignature) -> FloatArray:
+    def predict_proba(self, mesh: AnyPose) -> FloatArray:
         """(n, n_segments) posterior of each segment at each vertex; rows sum to 1."""
         self._fitted()
-        pose = self._described(mesh)
-        return pose.surface.to_vertices(self._posteriors(pose))
+        work = self._work(mesh)
+        return work.surface.to_vertices(self._joined(self._posteriors(work)))
 
-    @threadpool_limits.wrap(limits=1, user_api="blas")  # as in clean_labels
-    def predict_soft(self, mesh: TriangleMesh | PoseSignature) -> FloatArray:
+    @threadpool_limits.wrap(limits=1, user_api="blas")  # on arrays this small, threads wait for each other
+    def predict_soft(self, mesh: AnyPose) -> FloatArray:
         """(n, n_segments) posteriors as `predict_proba` has them, smoothed as far as the labels of faces are."""
         self._fitted()
-        pose = self._described(mesh)
-        posteriors, smoothness = self._posteriors(pose), self._setting("smoothness")
-        if smoothness > 0:
-            smooth = HeatFlow(pose.surface.mesh, smoothness * SMOOTHING_LENGTH).smooth(posteriors)
+        work = self._work(mesh)
+        posteriors = self._smoothed(work, self.n_segments_)
+        if self._setting("smoothness") > 0:
             # Obtuse triangles let the heat flow a little beyond 0 and 1.
-            posteriors = np.clip(smooth, 0, 1).astype(np.float64)
+            posteriors = np.clip(posteriors, 0, 1).astype(np.float64)
             posteriors /= posteriors.sum(axis=1, keepdims=True)
-        return pose.surface.to_vertices(posteriors)
+        return work.surface.to_vertices(posteriors)
 
-    def score(self, mesh: TriangleMesh | PoseSignature) -> float:
+    def score(self, mesh: AnyPose) -> float:
         """Mean log-likelihood of the signature over the area: how well the model explains a shape (section 5).
 
         Comparable between models with the same number of energies and the same scaling.
         """
         mixture = self._fitted()
-        pose = self._described(mesh)
+        pose = self._work(mesh).pose
         likelihoods = mixture.log_likelihoods(self._standardised(pose.signature))
         masses = unit_area_masses(pose.surface.mesh)
         # A density in standardised units, brought back to those of the signature that models share.
         return float(masses @ likelihoods / masses.sum() - np.log(self.spread_).sum())
 
-    def segment_faces(self, mesh: TriangleMesh | PoseSignature, min_share: float | None = None) -> IntArray:
+    def segment_faces(self, mesh: AnyPose, min_share: float | None = None) -> IntArray:
         """(m,) component of each face, cleaned: smooth borders, no connected part under `min_share` of the area.
 
         `min_share` is 0.005 if not given, and 0 without smoothing.
         A loose piece that is smaller as a whole takes the label of what is next to it.
         """
         self._fitted()
-        return self._clean([self._described(mesh)], None, min_share)[0]
+        return self._clean([self._work(mesh)], None, min_share)[0]
 
-    @threadpool_limits.wrap(limits=1, user_api="blas")  # as in clean_labels
-    def segment_regions(self, mesh: TriangleMesh | PoseSignature, min_share: float | None = None) -> IntArray:
+    @threadpool_limits.wrap(limits=1, user_api="blas")  # as above
+    def segment_regions(self, mesh: AnyPose, min_share: float | None = None) -> IntArray:
         """(m,) connected part of each face: left and right hand are two.
 
         Region i of one pose is region i of every other, on any meshing: as `regions_` has them, and numbered on from
@@ -261,14 +267,14 @@ class PoseSegmentation(PoseDescriber):
         part next to them.
         """
         self._fitted()
-        pose = self._described(mesh)
+        work = self._work(mesh)
         if self.regions_ is None:
-            return connected_regions(*self._clean([pose], None, min_share))
-        return self._named_regions(pose, min_share)
+            return connected_regions(*self._clean([work], None, min_share))
+        return self._named_regions(work, min_share)
 
     def segment_polygons(
         self,
-        poses: Sequence[TriangleMesh | PoseSignature],
+        poses: Sequence[AnyPose],
         polygons: Sequence[IntArray],
         min_share: float | None = None,
         progress: Callable[[float], None] | None = None,
@@ -300,18 +306,18 @@ class PoseSegmentation(PoseDescriber):
             If there is no pose, or the lengths do not fit.
         """
         self._fitted()
-        described = [self._described(pose) for pose in poses]
-        if not described or len(described) != len(polygons):
-            raise ValueError(f"there are {len(described)} poses, but polygons for {len(polygons)}")
-        for i, (pose, polygon_of) in enumerate(zip(described, polygons, strict=True)):
-            if np.shape(polygon_of) != (pose.surface.original.n_faces,):
+        works = [self._work(pose) for pose in poses]
+        if not works or len(works) != len(polygons):
+            raise ValueError(f"there are {len(works)} poses, but polygons for {len(polygons)}")
+        for i, (work, polygon_of) in enumerate(zip(works, polygons, strict=True)):
+            if np.shape(polygon_of) != (work.surface.original.n_faces,):
                 raise ValueError(
-                    f"pose {i} has {pose.surface.original.n_faces} triangles, but polygons for {np.shape(polygon_of)}"
+                    f"pose {i} has {work.surface.original.n_faces} triangles, but polygons for {np.shape(polygon_of)}"
                 )
-        return self._clean(described, polygons, min_share, progress, marked)[0]
+        return self._clean(works, polygons, min_share, progress, marked)[0]
 
-    @threadpool_limits.wrap(limits=1, user_api="blas")  # as in clean_labels
-    def polygon_sides(self, pose: TriangleMesh | PoseSignature, polygon_of: IntArray, labels: IntArray) -> IntArray:
+    @threadpool_limits.wrap(limits=1, user_api="blas")  # as above
+    def polygon_sides(self, pose: AnyPose, polygon_of: IntArray, labels: IntArray) -> IntArray:
         """Tell left from right where a segment lies on both sides.
 
         Parameters
@@ -329,14 +335,61 @@ class PoseSegmentation(PoseDescriber):
         others. All 0 with the paper's setting.
         """
         self._fitted()
-        described = self._described(pose)
-        if self.regions_ is None:
+        work, atlas = self._work(pose), self.regions_
+        if atlas is None:
             return np.zeros(len(labels), dtype=np.int64)
-        surface = described.surface
-        region = self._named_regions(described, None)
-        known = np.zeros(int(region.max()) + 1, dtype=np.int64)
-        known[: len(self.regions_.side)] = self.regions_.side[: len(known)]
-        return sides_of_parts(surface, side_field(surface, region, known), polygon_of, labels, MIN_SHARE)
+
+        def field() -> FloatArray:
+            region = self._named_regions(work, None)
+            known = np.zeros(int(region.max()) + 1, dtype=np.int64)
+            known[: len(atlas.side)] = atlas.side[: len(known)]
+            return side_field(work.surface, region, known, work.flows)
+
+        of_faces = work.memo.get("sides", (self.mixture_, self.grouping_, atlas, self._length()), field)
+        neighbours = work.memo.get("polygons", (polygon_of,), lambda: work.neighbours.between_polygons(polygon_of))
+        return sides_of_parts(work.surface, of_faces, polygon_of, labels, MIN_SHARE, neighbours)
+
+    def with_segments(
+        self,
+        n_segments: int | Literal["auto"],
+        poses: Sequence[AnyPose] = (),
+        rest: TriangleMesh | None = None,
+    ) -> PoseSegmentation:
+        """The same model with another number of segments, at once: its components joined to as many groups.
+
+        Not what a new fit gives: that makes more components for more than eight segments, takes the mixture whose
+        groups agree best at this number, and joins segments that are only crumbs at it. From eight to fewer segments
+        labels are much the same, to more they are others: docs/method.md has numbers.
+
+        Parameters
+        ----------
+        n_segments : int or "auto"
+            As for a new model, but no more than components.
+        poses, optional
+            Those that were learned from. `segment_regions` then has the regions of the new segments; without them it
+            has those that were learned, which serve `polygon_sides` as well.
+        rest : TriangleMesh, optional
+            As for `fit`.
+
+        Raises
+        ------
+        ValueError
+            If there are fewer components, or the model is of the paper's setting, where each is one segment.
+        """
+        n_components = len(self._fitted().weights)
+        if self.grouping_ is None:
+            raise ValueError("with the paper's setting each component is a segment: fit a new model for another number")
+        if n_segments != "auto" and n_segments > n_components:
+            raise ValueError(
+                f"n_segments is {n_segments}, but the model has {n_components} components: fit a new model for more"
+            )
+        model = copy(self)
+        model.n_segments = n_segments
+        model._check_parameters()
+        assert model.regions_ is not None
+        if len(poses) and self.grouping_.number_of_wholes(model.n_segments_) != model.regions_.n_groups:
+            model.regions_ = model._atlas([self._work(pose) for pose in poses], rest, lambda share: None)
+        return model
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the fitted model to a JSON file that holds data only.
@@ -444,18 +497,19 @@ class PoseSegmentation(PoseDescriber):
             raise ValueError("the model is not fitted: call fit, or load a model, first")
         return self.mixture_
 
-    def _described(self, mesh: TriangleMesh | PoseSignature) -> PoseSignature:
-        if isinstance(mesh, PoseSignature):
-            got = (mesh.n_eigenpairs, mesh.signature.shape[1])
-            if got != (self.n_eigenpairs, self.n_energies):
-                raise ValueError(
-                    f"the signature is of {got[0]} eigenpairs and {got[1]} energies, "
-                    f"the model of {self.n_eigenpairs} and {self.n_energies}"
-                )
-            return mesh
-        if not isinstance(mesh, TriangleMesh):
-            raise TypeError(f"a pose must be a TriangleMesh or a PoseSignature, not {type(mesh).__name__}")
-        return self.describe(mesh)
+    def _work(self, mesh: AnyPose) -> Workpiece:
+        pose = mesh.pose if isinstance(mesh, Workpiece) else mesh
+        if isinstance(pose, TriangleMesh):
+            return Workpiece(self.describe(pose))
+        if not isinstance(pose, PoseSignature):
+            raise TypeError(f"a pose must be a TriangleMesh or a PoseSignature, not {type(pose).__name__}")
+        got = (pose.n_eigenpairs, pose.signature.shape[1])
+        if got != (self.n_eigenpairs, self.n_energies):
+            raise ValueError(
+                f"the signature is of {got[0]} eigenpairs and {got[1]} energies, "
+                f"the model of {self.n_eigenpairs} and {self.n_energies}"
+            )
+        return mesh if isinstance(mesh, Workpiece) else Workpiece(pose)
 
     def _scaled(self, signature: FloatArray) -> FloatArray:
         return np.log(signature + SIGNATURE_OFFSET) if self._setting("scaling") == "log" else signature
@@ -476,35 +530,70 @@ class PoseSegmentation(PoseDescriber):
         mixture = self._fitted()
         return len(mixture.weights) if self.grouping_ is None else self._number(self.grouping_)
 
-    def _posteriors(self, pose: PoseSignature, n_groups: int | None = None) -> FloatArray:
-        """(n', n_groups) sums of the posteriors of each group's components; of each segment's if not given."""
-        posteriors = self._fitted().posteriors(self._standardised(pose.signature))
+    def _length(self) -> float:
+        """Smoothing length, in units of the square root of the area."""
+        return float(self._setting("smoothness") * SMOOTHING_LENGTH)
+
+    def _posteriors(self, work: Workpiece) -> FloatArray:
+        """(n', K) posteriors of the components at the vertices of a pose."""
+        return self._fitted().posteriors(self._standardised(work.pose.signature))
+
+    def _joined(self, posteriors: FloatArray, n_groups: int | None = None) -> FloatArray:
+        """(…, n_groups) sums of (…, K) posteriors over each group's components; over each segment's if not given."""
         if self.grouping_ is None:
             return posteriors
         n_groups = n_groups or self.n_segments_
         return np.asarray(posteriors @ np.eye(n_groups, dtype=posteriors.dtype)[self.grouping_.groups(n_groups)])
 
+    def _smoothed(self, work: Workpiece, n_groups: int | None) -> FloatArray:
+        """(n', n_groups) smoothed posteriors of groups at the vertices of a pose; of components if None.
+
+        Those of components are kept: they are the same for every number of groups.
+        """
+        mixture, length = self._fitted(), self._length()
+
+        def smooth(posteriors: FloatArray) -> FloatArray:
+            return work.flows.over(length).smooth(posteriors) if length > 0 else posteriors
+
+        if not self._keeps(len(work.pose.signature)):
+            return smooth(self._joined(self._posteriors(work), n_groups))
+        raw = work.memo.get("posteriors", (mixture,), lambda: self._posteriors(work))
+        of_components = work.memo.get("smoothed", (mixture, length), lambda: smooth(raw))
+        return of_components if n_groups is None else self._joined(of_components, n_groups)
+
+    def _keeps(self, count: int) -> bool:
+        """Whether posteriors of components at so many places are kept."""
+        return count * len(self._fitted().weights) <= MOST_NUMBERS
+
+    @threadpool_limits.wrap(limits=1, user_api="blas")  # on arrays this small, threads wait for each other
     def _clean(
         self,
-        poses: Sequence[PoseSignature],
+        works: Sequence[Workpiece],
         polygons: Sequence[IntArray] | None,
         min_share: float | None,
         progress: Callable[[float], None] | None = None,
         marked: IntArray | None = None,
         n_groups: int | None = None,
     ) -> tuple[IntArray, FaceAdjacency]:
-        """Segments, or with `n_groups` what regions are parts of; of polygons (None: triangles). See `clean_labels`."""
-        creases = {} if n_groups is None else {"crease": REGION_CREASE, "width": REGION_WIDTH}
-        return clean_labels(
-            [pose.surface for pose in poses],
-            lambda i: self._posteriors(poses[i], n_groups),
-            polygons,
-            self._setting("smoothness") * SMOOTHING_LENGTH,
-            self._least_share(min_share),
-            progress,
-            marked,
-            **creases,
+        """Segments, or with `n_groups` what regions are parts of; of polygons (None: triangles). See `PosedMesh`."""
+        mixture, length = self._fitted(), self._length()
+        # What poses of one mesh have in common is kept with the first.
+        kind, memo = ("faces" if polygons is None else "polygons"), works[0].memo
+        posed = memo.get(
+            f"posed {kind}", (*(work.pose for work in works), *(polygons or ())), lambda: PosedMesh(works, polygons)
         )
+        joined = n_groups or self.n_segments_
+        if self._keeps(max(posed.n_polygons, *(len(work.pose.signature) for work in works))):
+            of_components = memo.get(
+                f"mean {kind}",
+                (posed, mixture, length),
+                lambda: posed.mean(works, lambda work: self._smoothed(work, None), progress),
+            )
+            posteriors = self._joined(of_components, joined)
+        else:
+            posteriors = posed.mean(works, lambda work: self._smoothed(work, joined), progress)
+        creases = {} if n_groups is None else {"crease": REGION_CREASE, "width": REGION_WIDTH}
+        return posed.labelled(works, posteriors, length, self._least_share(min_share), marked, **creases)
 
     def _fields(self, pose: PoseSignature) -> FloatArray:
         """(n', FIELDS) the signature along the axes on which the components lie farthest apart."""
@@ -515,38 +604,38 @@ class PoseSegmentation(PoseDescriber):
         fields = self._standardised(pose.signature) @ axes
         return np.pad(fields, ((0, 0), (0, FIELDS - axes.shape[1])))
 
-    @threadpool_limits.wrap(limits=1, user_api="blas")  # as in clean_labels
+    @threadpool_limits.wrap(limits=1, user_api="blas")  # as above
     def _atlas(
-        self, poses: Sequence[PoseSignature], rest: TriangleMesh | None, tick: Callable[[float], None]
+        self, works: Sequence[Workpiece], rest: TriangleMesh | None, tick: Callable[[float], None]
     ) -> RegionAtlas:
         """The connected regions of the learned poses, and which are left and right."""
-        first = poses[0].surface.original
+        first = works[0].surface.original
         if rest is not None and not np.array_equal(rest.faces, first.faces):
             raise ValueError("rest has other faces than the first pose: pass the same mesh, in its rest position")
         assert self.grouping_ is not None
         n_groups = self.grouping_.number_of_wholes(self.n_segments_)
-        together = [poses] if of_one_mesh(poses) else [[pose] for pose in poses]
+        together = [works] if of_one_mesh([work.pose for work in works]) else [[work] for work in works]
         found: list[Regions] = []
         traits: list[Traits] = []
         for alike in together:
 
             def cleaning(share: float, begun: int = len(traits), count: int = len(alike)) -> None:
-                tick((begun + CLEANED * share * count) / len(poses))
+                tick((begun + CLEANED * share * count) / len(works))
 
-            labels, adjacency = self._clean(alike, None, None, cleaning, n_groups=n_groups)
-            regions = Regions.of(labels, adjacency, alike[0].surface.original)
+            labels, neighbours = self._clean(alike, None, None, cleaning, n_groups=n_groups)
+            regions = Regions.of(labels, neighbours, alike[0].surface.original)
             found.append(regions)
             begun = len(traits)
-            for i, pose in enumerate(alike):
-                tick((begun + CLEANED * len(alike) + (1 - CLEANED) * i) / len(poses))
-                traits.append(regions.traits(pose.surface, self._fields(pose)))
+            for i, work in enumerate(alike):
+                tick((begun + CLEANED * len(alike) + (1 - CLEANED) * i) / len(works))
+                traits.append(regions.traits(work.surface, self._fields(work.pose), work.flows))
         centres = found[0].centres(first if rest is None else rest)
         return RegionAtlas.learned(n_groups, traits, centres, alike=len(found) == 1)
 
-    def _named_regions(self, pose: PoseSignature, min_share: float | None) -> IntArray:
+    def _named_regions(self, work: Workpiece, min_share: float | None) -> IntArray:
         """(m,) region of each face, numbered as in the atlas, and on from there."""
         assert self.regions_ is not None
-        labels, adjacency = self._clean([pose], None, min_share, n_groups=self.regions_.n_groups)
-        regions = Regions.of(labels, adjacency, pose.surface.original)
-        names = self.regions_.named(regions.traits(pose.surface, self._fields(pose)))
+        labels, neighbours = self._clean([work], None, min_share, n_groups=self.regions_.n_groups)
+        regions = Regions.of(labels, neighbours, work.surface.original)
+        names = self.regions_.named(regions.traits(work.surface, self._fields(work.pose), work.flows))
         return regions.numbered(names, len(self.regions_.side))

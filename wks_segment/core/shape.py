@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from .mesh import BoolArray, FloatArray, IntArray, unique_edges
 from .regions import FaceAdjacency
-from .smoothing import HeatFlow
+from .smoothing import Flows, HeatFlow
 from .surface import Surface, indicator
 
 FINE, COARSE = 0.012, 0.02
@@ -80,9 +80,9 @@ def vertex_normals(surface: Surface) -> FloatArray:
     return _unit(indicator(mesh.faces.ravel(), mesh.n_vertices) @ np.repeat(of_faces, 3, axis=0))
 
 
-def smooth_normals(surface: Surface, normals: FloatArray, length: float) -> FloatArray:
-    """(n', 3) unit normals, averaged over about `length`."""
-    return _unit(HeatFlow(surface.mesh, length).smooth(normals).astype(np.float64))
+def smooth_normals(normals: FloatArray, flow: HeatFlow) -> FloatArray:
+    """(n', 3) unit normals, averaged by a flow over the surface."""
+    return _unit(flow.smooth(normals).astype(np.float64))
 
 
 def curvature_across(surface: Surface, normals: FloatArray, adjacency: FaceAdjacency) -> FloatArray:
@@ -96,7 +96,9 @@ def curvature_across(surface: Surface, normals: FloatArray, adjacency: FaceAdjac
     return np.asarray(np.einsum("ij,ij->i", of_faces[b] - of_faces[a], step) / squared)
 
 
-def log_thickness(surface: Surface, normals: FloatArray, tick: Callable[[float], None] | None = None) -> FloatArray:
+def log_thickness(
+    surface: Surface, normals: FloatArray, flows: Flows, tick: Callable[[float], None] | None = None
+) -> FloatArray:
     """(n',) logarithm of the radius of the largest ball that touches a surface of area 1 at a vertex from inside.
 
     By the shrinking ball of Ma, Bae and Choi (2012), against the tangent planes of what it touches, so that a thin
@@ -129,7 +131,7 @@ def log_thickness(surface: Surface, normals: FloatArray, tick: Callable[[float],
     if step > 1:
         radius = radius[tree.query(places)[1]]
     logs = np.log(radius + FLAT)[:, None]
-    return HeatFlow(mesh, THICKNESS_LENGTH).smooth(logs)[:, 0].astype(np.float64)
+    return flows.over(THICKNESS_LENGTH).smooth(logs)[:, 0].astype(np.float64)
 
 
 def border_weights(
@@ -140,9 +142,9 @@ def border_weights(
     `tick` is called with the share that is done.
     """
     original = surface.original
-    normals = vertex_normals(surface)
-    fine, coarse = (smooth_normals(surface, normals, length) for length in (FINE, COARSE))
-    thickness = surface.to_faces(log_thickness(surface, fine, tick)[:, None])[:, 0]
+    normals, flows = vertex_normals(surface), Flows(surface.mesh)
+    fine, coarse = (smooth_normals(normals, flows.over(length)) for length in (FINE, COARSE))
+    thickness = surface.to_faces(log_thickness(surface, fine, flows, tick)[:, None])[:, 0]
     curvature = curvature_across(surface, coarse, adjacency)
     centres = original.vertices[original.faces].mean(axis=1) / np.sqrt(original.area)
     a, b = adjacency.pairs.T

@@ -28,6 +28,7 @@ class WKS_SEGMENT_OT_clear(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         meshes = {obj.data for obj in mesh_objects(context.selected_objects) if obj.data.library is None}
         cleared = sum(clear_labels(mesh) for mesh in meshes)
+        context.scene.wks_segment.applied = ""
         if not any(has_labels(mesh) for mesh in bpy.data.meshes):
             feedback.hide_colors(context)
         self.report({"INFO"}, f"Cleared the segments of {cleared} mesh{'es' * (cleared != 1)}")

@@ -11,6 +11,7 @@ from ...core.description import Progress
 from ..characters import mesh_objects, why_no_mesh
 from ..jobs import BUSY, desk_of
 from ..report import Report
+from ..session import session_of
 
 LOOK = "VERTEX"
 """Color mode of solid shading that shows the color attribute."""
@@ -84,5 +85,13 @@ def no_job_runs(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bo
     """For `poll`: whether no job is running; sets the message if one is."""
     if desk_of(context).job is not None:
         cls.poll_message_set(BUSY)
+        return False
+    return True
+
+
+def shows_preview(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """For `poll`: whether segments are shown that are not written; sets the message if not."""
+    if session_of(context).proposed is None:
+        cls.poll_message_set("Nothing is shown that could be written: switch Preview on and change a setting")
         return False
     return True

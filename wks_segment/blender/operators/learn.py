@@ -16,6 +16,7 @@ class WKS_SEGMENT_OT_learn(RunsWork, bpy.types.Operator):
     bl_label = "Learn and Segment"
     bl_options = {"REGISTER", "UNDO"}
 
+    learns = True
     verb = "Learned"
 
     @classmethod

@@ -7,19 +7,23 @@ import bpy
 from .. import tasks
 from ..errors import ChangedError, EndedError, TooLargeError, UserError
 from ..jobs import Job, desk_of, redraw
+from ..session import session_of
 from ..work import Work
 from . import feedback
+from .tunable import Tunable
 
 WRITABLE = ("OBJECT", "POSE")
 """Modes in which Blender's undo takes note of meshes."""
 
 
-class RunsWork:
+class RunsWork(Tunable):
     """An operator that runs a `Work`; it asks before one above the user's limits, and without a window refuses it."""
 
     confirmed: bpy.props.BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
 
     bl_label: str
+    learns = False
+    """Whether its work is learning."""
     verb = ""
     """What it has done, for the status bar."""
     job: Job
@@ -35,6 +39,7 @@ class RunsWork:
         """Called by a button or a shortcut."""
         if not feedback.has_window(context):
             return self.execute(context)
+        self.take(context.scene.wks_segment)
         try:
             return self.started(context)
         except TooLargeError as error:
@@ -47,16 +52,29 @@ class RunsWork:
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Called by a script, by a redo, or after the question."""
+        self.take(context.scene.wks_segment)
         try:
             if self.asked:
                 self.asked = False
                 return self.started(context)
-            self.work = self.checked(context)
+            self.work = self.again(context) or self.checked(context)
             with feedback.cursor_progress(context) as progress:
                 self.work.compute(progress)
             return self.written(context)
         except UserError as error:
             return self.refused(error)
+
+    @property
+    def is_adjusted(self) -> bool:
+        """Whether it was undone to be done with other settings, in the panel Adjust Last Operation."""
+        return bool(self.options.is_repeat)  # type: ignore[attr-defined]  # an operator's own
+
+    def again(self, context: bpy.types.Context) -> Work | None:
+        """Of what is adjusted, the work with other settings; None where there is nothing to begin with."""
+        before = session_of(context).work
+        if not self.is_adjusted or before is None or before.learns != self.learns:
+            return None
+        return before.again(context.scene.wks_segment)
 
     def started(self, context: bpy.types.Context) -> set[str]:
         """Read, and let a thread compute; UserError if it cannot be done."""
@@ -116,6 +134,7 @@ class RunsWork:
     def written(self, context: bpy.types.Context) -> set[str]:
         """Write what was computed and report."""
         self.work.write()
+        session_of(context).keep(self.work, self.work.watch.scene())
         if self.work.wanted.colors:
             feedback.show_colors(context)
         return feedback.finish(self, self.verb, self.work.report)

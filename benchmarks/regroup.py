@@ -1,0 +1,79 @@
+"""A model cut at another number of segments beside one that is fitted for it: `python -m benchmarks.regroup FILE…`.
+
+Each file is imported by Blender, and five frames of its animation are learned with eight segments. Prints a Markdown
+table of the share of the area whose label is the same as that of a fresh fit, after the best matching of segments, on
+the learned poses together.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.sparse import coo_matrix
+
+import wks_segment.blender
+from benchmarks.speed import table_row
+from wks_segment.blender import files, tasks
+from wks_segment.blender.report import Report
+from wks_segment.blender.training import read_training_poses
+from wks_segment.core import PoseSegmentation
+from wks_segment.core.mesh import FloatArray, IntArray
+
+NUMBERS = (4, 6, 10, 12, 16)
+
+
+def main() -> None:
+    """Run over the files."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("files", type=Path, nargs="+")
+    options = parser.parse_args()
+    wks_segment.blender.register()
+    code = 1
+    try:
+        print(table_row(["character", *(f"8 → {number}" for number in NUMBERS)]))
+        print(table_row(["---"] * (1 + len(NUMBERS))))
+        for path in options.files:
+            print(table_row([path.stem, *(f"{share:.3f}" for share in agreements(path))]), flush=True)
+        code = 0
+    finally:
+        wks_segment.blender.unregister()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        if code == 0:
+            os._exit(0)  # some versions of bpy hang at exit
+
+
+def agreements(path: Path) -> list[float]:
+    """Of the regrouped with the fresh model, for each number."""
+    (objects,) = files.open_files([path])
+    for obj in objects:
+        obj.select_set(obj.type == "MESH")
+    settings, report = bpy.context.scene.wks_segment, Report([])
+    poses = read_training_poses(bpy.context, settings, report)
+    polygons, rest = [pose.polygon_of for pose in poses], poses[0].upright
+    eight = settings.new_model()
+    described = tasks.describe(eight, poses, report, lambda stage, share: None)
+    eight.fit(described, rest=rest)
+    areas = np.bincount(polygons[0], poses[0].mesh.face_areas).astype(np.float64)
+    found = []
+    for number in NUMBERS:
+        fresh = PoseSegmentation(number).fit(described, rest=rest)
+        ours, theirs = (model.segment_polygons(described, polygons) for model in (eight.with_segments(number), fresh))
+        found.append(alike(ours, theirs, areas))
+    return found
+
+
+def alike(labels: IntArray, others: IntArray, areas: FloatArray) -> float:
+    """Share of the area with the same label, after the best matching."""
+    shared = coo_matrix((areas, (labels, others))).toarray()
+    return float(shared[linear_sum_assignment(-shared)].sum() / areas.sum())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,233 @@
+"""Signatures that were computed before: the same for the same content and settings, and for nothing else."""
+
+import multiprocessing
+import os
+import sys
+import time
+
+import numpy as np
+import pytest
+from shapes import creature, together
+
+from wks_segment.core import DiskCache, MemoryCache, PoseSegmentation, TriangleMesh, connect
+
+SMALL = {"n_segments": 4, "n_eigenpairs": 30, "n_energies": 20}
+POSE = creature(0.3, 3)
+
+
+class Counting:
+    """A cache that tells what it was asked."""
+
+    def __init__(self, cache):
+        self.cache, self.hits, self.misses = cache, 0, 0
+
+    def get(self, key):
+        found = self.cache.get(key)
+        self.hits, self.misses = self.hits + (found is not None), self.misses + (found is None)
+        return found
+
+    def put(self, key, signature):
+        self.cache.put(key, signature)
+
+
+@pytest.fixture(params=["memory", "disk"])
+def cache(request, tmp_path):
+    """A cache that holds the signature of one pose."""
+    kept = Counting(MemoryCache() if request.param == "memory" else DiskCache(tmp_path / "kept"))
+    PoseSegmentation(**SMALL).describe_all([POSE], cache=kept)
+    assert (kept.hits, kept.misses) == (0, 1)
+    return kept
+
+
+def same(one, other):
+    ours, theirs = one.arrays(), other.arrays()
+    assert ours.keys() == theirs.keys()
+    for name, array in ours.items():
+        assert array.dtype == theirs[name].dtype, name
+        np.testing.assert_array_equal(array, theirs[name], name)
+    return True
+
+
+def test_a_signature_is_what_would_be_computed(cache):
+    computed = PoseSegmentation(**SMALL).describe(POSE)
+    (kept,) = PoseSegmentation(**SMALL).describe_all([TriangleMesh(POSE.vertices, POSE.faces)], cache=cache)
+    assert cache.hits == 1
+    assert same(kept, computed)
+    assert kept.laplacian == computed.laplacian
+
+
+def test_what_does_not_enter_the_signature_does_not_matter(cache):
+    others = {"n_segments": 6, "smoothness": 2.0, "covariance_type": "diag", "scaling": "raw", "random_state": 3}
+    PoseSegmentation(**{**SMALL, **others}).describe_all([POSE], cache=cache)
+    assert cache.hits == 1
+
+
+@pytest.mark.parametrize(
+    "change", [{"n_eigenpairs": 31}, {"n_energies": 21}, {"accuracy": "exact"}, {"laplacian": "delaunay"}]
+)
+def test_another_setting_is_another_signature(cache, change):
+    model = PoseSegmentation(**{**SMALL, **change})
+    (found,) = model.describe_all([POSE], cache=cache)
+    assert cache.hits == 0
+    assert same(found, model.describe(POSE))
+
+
+def test_a_moved_vertex_another_face_or_another_order_is_another_mesh(cache):
+    moved = POSE.vertices.copy()
+    moved[7, 1] += 1e-9
+    turned = POSE.faces.copy()
+    turned[3] = turned[3, [0, 2, 1]]
+    for mesh in (
+        TriangleMesh(moved, POSE.faces),
+        TriangleMesh(POSE.vertices, POSE.faces[1:]),
+        TriangleMesh(POSE.vertices, turned),
+        TriangleMesh(np.append(POSE.vertices, [[0.0, 0, 0]], axis=0), POSE.faces),
+    ):
+        PoseSegmentation(**SMALL).describe_all([mesh], cache=cache)
+    assert cache.hits == 0
+
+
+def test_what_is_connected_otherwise_is_another_surface(cache):
+    """A cut that is closed in this pose, but open in another one."""
+    cut = POSE.faces.copy()
+    corner = cut[0, 0]
+    cut[0, 0] = POSE.n_vertices
+    vertices = np.append(POSE.vertices, POSE.vertices[[corner]], axis=0)
+    opened = vertices.copy()
+    opened[-1] += 0.1
+    closed, other = TriangleMesh(vertices, cut), TriangleMesh(opened, cut)
+    model = PoseSegmentation(**SMALL)
+    model.describe_all([closed], cache=cache)
+    model.describe_all([closed], [connect(closed, other)], cache=cache)
+    assert cache.hits == 0
+
+
+def test_how_loose_parts_are_tied_matters(cache):
+    pair = together(POSE, TriangleMesh(0.2 * POSE.vertices + 3, POSE.faces))
+    for pieces in ("joined", "separate"):
+        PoseSegmentation(**SMALL, pieces=pieces).describe_all([pair], cache=cache)
+    assert (cache.hits, cache.misses) == (0, 3)
+
+
+def test_poses_that_were_done_are_kept_when_a_job_is_cancelled():
+    cache, poses = Counting(MemoryCache()), [creature(bend, 3) for bend in (0.0, 0.2, 0.4)]
+
+    def cancel(stage, share):
+        if share > 0.6:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        PoseSegmentation(**SMALL).describe_all(poses, progress=cancel, workers=1, cache=cache)
+    PoseSegmentation(**SMALL).describe_all(poses, cache=cache)
+    assert cache.hits >= 1
+
+
+def described(*bends):
+    return [PoseSegmentation(**SMALL).describe(creature(bend, 3)) for bend in bends]
+
+
+def test_memory_is_limited_and_the_least_recently_used_leaves_first():
+    one, two, three = described(0.0, 0.2, 0.4)
+    size = sum(array.nbytes for array in one.arrays().values())
+    cache = MemoryCache(int(2.5 * size))
+    cache.put("one", one)
+    cache.put("two", two)
+    assert cache.get("one") is one
+    cache.put("three", three)
+    assert (cache.get("one"), cache.get("two"), cache.get("three")) == (one, None, three)
+    assert 0 < cache.size <= cache.limit
+    cache.clear()
+    assert cache.get("one") is None
+    assert cache.size == 0
+
+
+def test_what_is_larger_than_the_limit_is_not_kept():
+    (one,) = described(0.0)
+    cache = MemoryCache(1000)
+    cache.put("one", one)
+    assert cache.get("one") is None
+
+
+def test_what_is_kept_cannot_be_changed_by_one_who_asks():
+    cache, (one,) = MemoryCache(), described(0.0)
+    cache.put("one", one)
+    with pytest.raises(ValueError, match="read-only"):
+        cache.get("one").signature[0] = 0
+
+
+def test_a_folder_is_limited_and_the_least_recently_used_leaves_first(tmp_path):
+    poses = described(0.0, 0.2, 0.4)
+    cache = DiskCache(tmp_path, 10**9)
+    for i, pose in enumerate(poses[:2]):
+        cache.put(str(i), pose)
+        os.utime(tmp_path / f"{i}.npz", (1000 + i, 1000 + i))
+    assert cache.get("0") is not None
+    cache.limit = int(2.5 * (tmp_path / "0.npz").stat().st_size)
+    cache.put("2", poses[2])
+    assert [cache.get(str(i)) is None for i in range(3)] == [False, True, False]
+
+
+def test_a_damaged_file_counts_as_none_and_is_replaced(tmp_path):
+    cache, (one, two) = DiskCache(tmp_path), described(0.0, 0.2)
+    for damage in (b"", b"PK\x03\x04 no zip", None):
+        cache.put("one", two)
+        whole = (tmp_path / "one.npz").read_bytes()
+        (tmp_path / "one.npz").write_bytes(whole[: len(whole) // 2] if damage is None else damage)
+        assert cache.get("one") is None
+        cache.put("one", one)
+        assert same(cache.get("one"), one)
+
+
+def test_a_file_with_objects_is_not_read(tmp_path):
+    cache = DiskCache(tmp_path)
+    np.savez(tmp_path / "one.npz", vertices=np.array([{}], dtype=object))
+    assert cache.get("one") is None
+
+
+def test_a_folder_that_cannot_be_written_to_is_told_of_and_costs_nothing(tmp_path):
+    class Full:
+        def get(self, key):
+            return None
+
+        def put(self, key, signature):
+            raise OSError("no space left on device")
+
+    with pytest.warns(UserWarning, match="not kept for the next time: no space left"):
+        assert PoseSegmentation(**SMALL).describe(POSE, cache=Full()).signature.shape[1] == 20
+
+
+def test_unfinished_files_are_none_and_go_when_they_are_old(tmp_path):
+    cache, (one,) = DiskCache(tmp_path), described(0.0)
+    old, new = tmp_path / "old.part", tmp_path / "new.part"
+    for path in (old, new):
+        path.write_bytes(b"half")
+    long_ago = time.time() - 7200
+    os.utime(old, (long_ago, long_ago))
+    cache.put("one", one)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["new.part", "one.npz"]
+
+
+def write_often(folder, limit, seed):
+    pose = PoseSegmentation(**SMALL).describe(creature(0.1, 2))
+    cache = DiskCache(folder, limit)
+    found = 0
+    for i in np.random.default_rng(seed).integers(0, 6, 60):
+        kept = cache.get(str(i))
+        found += kept is not None
+        assert kept is None or same(kept, pose)
+        cache.put(str(i), pose)
+    sys.exit(0 if found else 3)
+
+
+def test_several_processes_use_one_folder(tmp_path):
+    limit = 4 * sum(array.nbytes for array in PoseSegmentation(**SMALL).describe(creature(0.1, 2)).arrays().values())
+    context = multiprocessing.get_context("spawn")
+    writers = [context.Process(target=write_often, args=(tmp_path, limit, seed)) for seed in range(3)]
+    for writer in writers:
+        writer.start()
+    for writer in writers:
+        writer.join(120)
+    assert [writer.exitcode for writer in writers] == [0, 0, 0]
+    files = list(tmp_path.iterdir())
+    assert {path.suffix for path in files} == {".npz"}
+    assert sum(path.stat().st_size for path in files) <= limit

@@ -1,0 +1,35 @@
+"""Accept Preview."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..errors import UserError
+from ..session import session_of
+from . import feedback
+
+
+class WKS_SEGMENT_OT_accept(bpy.types.Operator):
+    """Write the segments that are shown"""
+
+    bl_idname = "wks_segment.accept"
+    bl_label = "Accept"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return (
+            feedback.shows_preview(cls, context)
+            and feedback.no_job_runs(cls, context)
+            and feedback.in_object_mode(cls, context)
+        )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        try:
+            work = session_of(context).update(context.scene)
+        except UserError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        if work.wanted.colors:
+            feedback.show_colors(context)
+        return feedback.finish(self, "Accepted", work.report)

@@ -1,0 +1,32 @@
+"""Update Segments."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..errors import UserError
+from ..session import NOTHING, session_of
+from . import feedback
+
+
+class WKS_SEGMENT_OT_update(bpy.types.Operator):
+    """Find the segments of what was learned or applied last anew, with the settings as they are now"""
+
+    bl_idname = "wks_segment.update"
+    bl_label = "Update Segments"
+    bl_options = {"UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not session_of(context).holds(context.scene):
+            cls.poll_message_set(NOTHING)
+            return False
+        return feedback.no_job_runs(cls, context) and feedback.in_object_mode(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        try:
+            work = session_of(context).update(context.scene)
+        except UserError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return feedback.finish(self, "Updated", work.report)

@@ -1,0 +1,210 @@
+"""What was learned or applied last, kept in memory so that other settings are a matter of moments."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import count
+from typing import TYPE_CHECKING, Any
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..core import MemoryCache
+from .errors import ChangedError, UserError
+from .jobs import desk_of, redraw
+from .preview import Preview
+
+if TYPE_CHECKING:
+    from .settings import WKSSegmentSettings
+    from .work import Work
+
+HOLDER = "wks_segment_session"
+"""Name of the session at the type of Blender's window manager."""
+REST = 0.1
+"""Seconds for which settings must have rested."""
+LIVE_SECONDS = 5.0
+"""Labels that took longer the last time do not follow by themselves."""
+LIVE = ("n_segments", "auto_segments", "sides", "smoothness", "min_share", "snap_to")
+"""Settings that labels follow."""
+NOTHING = "Nothing was learned or applied since this file was opened, or it was undone"
+MOST_BYTES = 1_000_000_000
+"""Signatures of a work that is kept, at most."""
+
+
+class Session:
+    """The signatures of meshes, and the work that was done last; lets labels follow the settings.
+
+    The scene says which work its labels are from, and with which settings: so undo and redo take that with them.
+    """
+
+    def __init__(self) -> None:
+        self.cache = MemoryCache()
+        self.work: Work | None = None
+        self.said = ""
+        """Why labels do not follow any more."""
+        self.proposed: tuple[str, Work] | None = None
+        """What labels would be with settings, until it is accepted or discarded."""
+        self.preview = Preview()
+        self._before: dict[str, Any] = {}
+        self._numbers = count(1)
+        self._name = ""
+        self._due = 0.0
+        self.timer = self.tick
+        self._handlers = ((bpy.app.handlers.load_pre, self._on_load), (bpy.app.handlers.undo_post, self._on_undo))
+        for handlers, function in self._handlers:
+            handlers.append(function)
+
+    def keep(self, work: Work, scene: bpy.types.Scene) -> None:
+        """Keep a work that was written to a scene."""
+        if work.first is None:
+            self._name = f"work {next(self._numbers)}"
+        self.withdraw()
+        self.work, self.said = work, ""
+        self._before = _values(scene.wks_segment)
+        if sum(each.pose.signature.nbytes for each in set(work.described)) > MOST_BYTES:
+            self.drop()
+        scene.wks_segment.applied = self._state(scene)
+
+    def holds(self, scene: bpy.types.Scene) -> bool:
+        """Whether the labels in a scene are of the work that is kept."""
+        return self.work is not None and scene.wks_segment.applied.partition(":")[0] == self._name
+
+    def follows(self, scene: bpy.types.Scene) -> bool:
+        """Whether the labels in a scene are those that the settings ask for."""
+        return bool(scene.wks_segment.applied == self._state(scene))
+
+    @property
+    def seconds(self) -> float:
+        """What finding labels took the last time."""
+        return 0.0 if self.work is None else self.work.report.seconds.get("label", 0.0)
+
+    def mark(self, scene: bpy.types.Scene) -> None:
+        """Let labels follow as soon as the settings rest, if they are to."""
+        if not (scene.wks_segment.live and self.holds(scene)) or self.seconds > LIVE_SECONDS:
+            return
+        self._due = time.monotonic() + REST
+        if not bpy.app.timers.is_registered(self.timer):
+            bpy.app.timers.register(self.timer, first_interval=REST)
+
+    def tick(self) -> float | None:
+        """Called by Blender's timer: the seconds until the next call, None for no further one."""
+        context = bpy.context
+        rest = self._due - time.monotonic()
+        if rest > 0 or desk_of(context).job is not None:
+            return max(rest, REST)
+        scene = context.scene
+        if not self.holds(scene) or self.follows(scene) or context.mode != "OBJECT":
+            return None
+        window = next(iter(context.window_manager.windows), None)
+        try:
+            if scene.wks_segment.preview:
+                self.propose(context)
+            else:
+                # One step for undo, as if a person had pressed the button.
+                with context.temp_override(window=window):
+                    bpy.ops.wks_segment.update("EXEC_DEFAULT", True)
+        except (RuntimeError, UserError) as error:
+            self.said = str(error).removeprefix("Error: ").strip()
+        redraw(context)
+        return None
+
+    def update(self, scene: bpy.types.Scene) -> Work:
+        """Do what was done last with the settings as they are now.
+
+        Raises
+        ------
+        UserError
+            If there is nothing, the settings take another model, or a mesh is another one by now: nothing is kept then.
+        """
+        if self.work is None:
+            raise UserError(NOTHING)
+        with self._dropping():
+            work = self._again(scene)
+            work.write()
+        self.keep(work, scene)
+        return work
+
+    def propose(self, context: bpy.types.Context) -> None:
+        """Show in the viewport what `update` would write, and write nothing."""
+        scene = context.scene
+        with self._dropping():
+            work = self._again(scene)
+            self.proposed, self.said = (self._state(scene), work), ""
+            self.preview.show(context, work.labels)
+
+    def discard(self, scene: bpy.types.Scene) -> None:
+        """Take back what is proposed, and the settings that it is from."""
+        self.withdraw()
+        for name, value in self._before.items():
+            setattr(scene.wks_segment, name, value)
+
+    def withdraw(self) -> None:
+        """Show nothing that is not written."""
+        self.proposed = None
+        self.preview.hide()
+
+    def _again(self, scene: bpy.types.Scene) -> Work:
+        """The work with the settings as they are now, which may be what is proposed."""
+        if self.work is None:
+            raise UserError(NOTHING)
+        if self.proposed is not None and self.proposed[0] == self._state(scene):
+            return self.proposed[1]
+        work = self.work.again(scene.wks_segment)
+        work.compute(lambda stage, share: None)
+        return work
+
+    @contextmanager
+    def _dropping(self) -> Iterator[None]:
+        """Forget the work if the scene turns out to be another one."""
+        try:
+            yield
+        except ChangedError as error:
+            self.drop()
+            raise UserError(f"Segments do not follow any more, learn or apply again: {error}") from error
+
+    def drop(self) -> None:
+        """Forget the work."""
+        self.withdraw()
+        self.work, self._name = None, ""
+
+    def close(self) -> None:
+        """Forget all, and hear no more of Blender."""
+        self.drop()
+        self.cache.clear()
+        if bpy.app.timers.is_registered(self.timer):
+            bpy.app.timers.unregister(self.timer)
+        for handlers, function in self._handlers:
+            if function in handlers:
+                handlers.remove(function)
+
+    def _state(self, scene: bpy.types.Scene) -> str:
+        values = _values(scene.wks_segment)
+        if values["auto_segments"]:
+            del values["n_segments"]
+        return f"{self._name}:{values | {'snap_to': sorted(values['snap_to'])}}"
+
+    @persistent
+    def _on_load(self, *_: Any) -> None:
+        self.drop()
+        self.said = ""
+
+    @persistent
+    def _on_undo(self, *_: Any) -> None:
+        self.withdraw()
+        if self.work is None:
+            return
+        if any(member.found() is None for pose in self.work.poses for member in pose.character.members):
+            self.drop()
+
+
+def _values(settings: WKSSegmentSettings) -> dict[str, Any]:
+    """Of the settings that labels follow."""
+    return {name: getattr(settings, name) for name in LIVE}
+
+
+def session_of(context: bpy.types.Context) -> Session:
+    """The session of this Blender."""
+    session: Session = getattr(context.window_manager, HOLDER)
+    return session

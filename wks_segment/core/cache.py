@@ -1,0 +1,175 @@
+"""Signatures that were computed before, by the content of what they were computed from.
+
+A cache is given to `describe_all`; there is none unasked. In memory for one process, on disk for several.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+import threading
+import time
+import zipfile
+import zlib
+from collections import OrderedDict
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from .mesh import TriangleMesh
+from .pose_signature import PoseSignature
+from .surface import Connection
+
+VERSION = 1
+"""To be raised whenever the same mesh and settings give another signature than before."""
+MEMORY = 1_000_000_000
+"""Bytes that a cache in memory holds at most, if nothing else is said …"""
+DISK = 10_000_000_000
+"""… and one on disk."""
+SUFFIX, UNFINISHED = ".npz", ".part"
+ABANDONED = 3600.0
+"""Seconds after which an unfinished file is of a process that is no more."""
+
+
+class SignatureCache(Protocol):
+    """Where signatures are kept. Several threads may ask at once."""
+
+    def get(self, key: str) -> PoseSignature | None:
+        """What was put there under a key; None if nothing, or nothing any more."""
+        ...
+
+    def put(self, key: str, signature: PoseSignature) -> None:
+        """Keep a signature under a key."""
+        ...
+
+
+def signature_key(mesh: TriangleMesh, connection: Connection, settings: Mapping[str, str | int]) -> str:
+    """A name for the signature of a mesh with settings: another one if anything that enters it differs.
+
+    By content as it is: the same mesh elsewhere in space is another one.
+    """
+    digest = hashlib.blake2b(digest_size=20)
+    digest.update(repr((VERSION, sorted(settings.items()))).encode())
+    arrays = {**mesh.arrays(), "welded": connection.welded, "kept": connection.kept, "ties": connection.ties}
+    for name, array in arrays.items():
+        # Shapes keep apart what would be the same row of bytes.
+        digest.update(repr((name, array.shape, array.dtype.str)).encode())
+        digest.update(np.ascontiguousarray(array).data)
+    return digest.hexdigest()
+
+
+class MemoryCache:
+    """Signatures in memory, of which the least recently used leave first.
+
+    Parameters
+    ----------
+    limit : int
+        Bytes at most. What is larger alone is not kept.
+    """
+
+    def __init__(self, limit: int = MEMORY) -> None:
+        self.limit = limit
+        self._kept: OrderedDict[str, tuple[PoseSignature, int]] = OrderedDict()
+        self._lock = threading.Lock()
+
+    @property
+    def size(self) -> int:
+        """Bytes that are held."""
+        with self._lock:
+            return sum(size for _, size in self._kept.values())
+
+    def get(self, key: str) -> PoseSignature | None:
+        """See `SignatureCache`."""
+        with self._lock:
+            if key not in self._kept:
+                return None
+            self._kept.move_to_end(key)
+            return self._kept[key][0]
+
+    def put(self, key: str, signature: PoseSignature) -> None:
+        """See `SignatureCache`."""
+        arrays = signature.arrays().values()
+        signature.signature.setflags(write=False)  # all who ask get the same one
+        with self._lock:
+            self._kept.pop(key, None)
+            self._kept[key] = signature, sum(array.nbytes for array in arrays)
+            held = sum(size for _, size in self._kept.values())
+            while held > self.limit:
+                held -= self._kept.popitem(last=False)[1][1]
+
+    def clear(self) -> None:
+        """Forget all."""
+        with self._lock:
+            self._kept.clear()
+
+
+class DiskCache:
+    """Signatures in the files of a folder, of which the least recently used are removed first.
+
+    Several processes may use the folder at once: a file appears whole or not at all, and one that is damaged counts as
+    none.
+
+    Parameters
+    ----------
+    folder : path
+        Made if it is not there. Nothing else should be in it.
+    limit : int
+        Bytes at most, but for what others are writing.
+    """
+
+    def __init__(self, folder: str | os.PathLike[str], limit: int = DISK) -> None:
+        self.folder = Path(folder)
+        self.limit = limit
+        self.folder.mkdir(parents=True, exist_ok=True)
+
+    def get(self, key: str) -> PoseSignature | None:
+        """See `SignatureCache`."""
+        path = self._path(key)
+        try:
+            with np.load(path, allow_pickle=False) as arrays:
+                found = PoseSignature.of_arrays(arrays)
+            os.utime(path)
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
+            return None
+        return found
+
+    def put(self, key: str, signature: PoseSignature) -> None:
+        """See `SignatureCache`; OSError if the file cannot be written."""
+        with tempfile.NamedTemporaryFile(dir=self.folder, suffix=UNFINISHED, delete=False) as file:
+            unfinished = Path(file.name)
+            try:
+                np.savez(file, **signature.arrays())
+            except BaseException:
+                file.close()
+                unfinished.unlink()
+                raise
+        try:
+            unfinished.replace(self._path(key))
+        except PermissionError:  # Windows, while another process reads the same: it is there, then
+            unfinished.unlink()
+        self._tidy()
+
+    def _path(self, key: str) -> Path:
+        return self.folder / f"{key}{SUFFIX}"
+
+    def _tidy(self) -> None:
+        """Remove what is too much, and what was abandoned. Others may do so at the same time."""
+        files = []
+        for path in self.folder.iterdir():
+            with suppress(FileNotFoundError):
+                state = path.stat()
+                if path.suffix == SUFFIX:
+                    files.append((state.st_mtime_ns, state.st_size, path))
+                elif path.suffix == UNFINISHED and state.st_mtime < time.time() - ABANDONED:
+                    path.unlink()
+        held = sum(size for _, size, _ in files)
+        for _, size, path in sorted(files):
+            if held <= self.limit:
+                break
+            with suppress(FileNotFoundError, PermissionError):
+                path.unlink()
+            held -= size
