@@ -35,6 +35,7 @@ CHAIN = [
     "grouping",
     "learning",
     "region_atlas",
+    "part_notes",
     "model_file",
     "segmentation",
 ]

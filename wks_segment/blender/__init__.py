@@ -6,10 +6,11 @@ from typing import Any
 
 import bpy
 
-from . import command, operators, panel
+from . import command, operators, panel, panel_segments
+from .segment_item import WKSSegmentItem
 from .settings import WKSSegmentSettings
 
-CLASSES = (WKSSegmentSettings, *operators.CLASSES, *panel.CLASSES)
+CLASSES = (WKSSegmentItem, WKSSegmentSettings, *operators.CLASSES, *panel.CLASSES, *panel_segments.CLASSES)
 COMMAND = "wks_segment"
 
 _commands: list[Any] = []

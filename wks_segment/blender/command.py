@@ -16,6 +16,7 @@ from ..core.description import Progress
 from . import demo, files, parts, tasks
 from . import poses as reader
 from .characters import Character, armature_of, group, mesh_objects
+from .edits import merged
 from .errors import UserError
 from .picture import Tile, render_poses
 from .poses import Pose
@@ -223,6 +224,7 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     report.tell_of(model)
     poses = _read(options, report)
     settings = _settings(options)
+    settings.keep_notes(model.part_notes_)
     if options.smoothness is not None:
         model.smoothness = settings.smoothness
     tasks.check_limits(model, poses, settings)
@@ -321,6 +323,7 @@ def _settings(options: argparse.Namespace) -> WKSSegmentSettings:
     """Default settings, whatever the file holds, with what the command line says."""
     settings: WKSSegmentSettings = bpy.context.scene.wks_segment
     settings.property_unset("write_colors")
+    settings.property_unset("part_notes")
     for name in (OPTIONS | OUTPUT_OPTIONS).values():
         settings.property_unset(name)
         value = getattr(options, name, None)
@@ -343,7 +346,9 @@ def _label(
         tasks.write(labels, settings, report, soft)
     if options.render:
         with report.stage("render"):
-            render_poses([Tile(pose, labels[pose.character], pose.name) for pose in poses], options.render)
+            joined = settings.notes().joined
+            tiles = [Tile(pose, merged(labels[pose.character], joined), pose.name) for pose in poses]
+            render_poses(tiles, options.render, style=settings.style())
 
 
 def _save(model: PoseSegmentation, path: Path) -> None:

@@ -9,7 +9,7 @@ import bpy
 
 from ...core import PoseSegmentation
 from ...core.description import Progress
-from .. import tasks
+from .. import segments, tasks
 from ..characters import mesh_objects, why_no_mesh
 from ..errors import TooLargeError, UserError
 from ..poses import Pose
@@ -17,6 +17,9 @@ from ..tasks import Report
 
 LOOK = "VERTEX"
 """Color mode of solid shading that shows the color attribute."""
+
+MODES = {"OBJECT": "Object Mode", "EDIT_MESH": "Edit Mode"}
+"""What artists call modes."""
 
 
 @contextmanager
@@ -74,6 +77,17 @@ def has_selected_mesh(cls: type[bpy.types.Operator], context: bpy.types.Context)
     """For `poll`: whether a mesh is selected; sets the message if not."""
     if not mesh_objects(context.selected_objects):
         cls.poll_message_set(why_no_mesh(context.selected_objects))
+        return False
+    return True
+
+
+def has_segments(cls: type[bpy.types.Operator], context: bpy.types.Context, modes: str = "OBJECT EDIT_MESH") -> bool:
+    """For `poll`: whether there is a segment in the list and the mode is one of these; sets the message if not."""
+    if context.mode not in modes.split():
+        cls.poll_message_set(f"Switch to {' or '.join(MODES[mode] for mode in modes.split())} first")
+        return False
+    if segments.active_part(context.scene.wks_segment) is None:
+        cls.poll_message_set("No segments yet: use Learn and Segment or Apply to Selected, or refresh the list")
         return False
     return True
 
