@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import bpy
+import numpy as np
 
 from .. import segments
-from ..edits import by_hand, keep_by_hand
+from ..edits import keep_by_hand
 from . import feedback
 
 
@@ -31,7 +32,7 @@ class WKS_SEGMENT_OT_restore_segments(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
         for mesh in segments.meshes_of(segments.labelled(settings)):
-            keep_by_hand(mesh, by_hand(mesh) * 0 - 1)
+            keep_by_hand(mesh, np.full(len(mesh.polygons), -1))
         settings.keep_notes(replace(settings.notes(), joined={}))
         segments.rewrite_all(settings)
         self.report({"INFO"}, "The segments are those of the model")

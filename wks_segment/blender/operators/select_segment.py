@@ -1,14 +1,13 @@
-"""Select Faces."""
+"""Select Segment."""
 
 from __future__ import annotations
 
+import bmesh
 import bpy
-import numpy as np
 from bpy.props import BoolProperty
 
 from .. import segments
-from ..edits import values
-from ..labels import labels_on
+from ..labels import note_of
 from . import feedback
 
 
@@ -33,11 +32,11 @@ class WKS_SEGMENT_OT_select_segment(bpy.types.Operator):
         settings = context.scene.wks_segment
         part = segments.active_part(settings)
         objects = [obj for obj in segments.labelled(settings) if obj.visible_get()]
-        with segments.object_mode(context):
-            count = sum(_select(mesh, part, self.extend) for mesh in segments.meshes_of(objects))
-        if not count:
-            self.report({"WARNING"}, f"No face of {settings.style().name_of(part)} is to be seen on these objects")
-            return {"FINISHED"}
+        if context.mode == "EDIT_MESH":
+            objects = [obj for obj in objects if obj.mode == "EDIT"]
+        if part is None or not objects:
+            self.report({"WARNING"}, "No object with segments is to be seen here")
+            return {"CANCELLED"}
         context.scene.tool_settings.mesh_select_mode = (False, False, True)
         if context.mode == "OBJECT":
             for obj in objects:
@@ -45,21 +44,19 @@ class WKS_SEGMENT_OT_select_segment(bpy.types.Operator):
             if context.view_layer.objects.active not in objects:
                 context.view_layer.objects.active = objects[0]
             bpy.ops.object.mode_set(mode="EDIT")
+        if not self.extend:
+            bpy.ops.mesh.select_all(action="DESELECT")
+        count = sum(_select(mesh, part) for mesh in segments.meshes_of(objects))
         self.report({"INFO"}, f"{count} faces of {settings.style().name_of(part)}")
         return {"FINISHED"}
 
 
-def _select(mesh: bpy.types.Mesh, part: int | None, extend: bool) -> int:
-    """Select the faces of a part that are to be seen; how many."""
-    labels = labels_on(mesh)
-    if labels is None:
-        return 0
-    chosen = (labels == part) & ~values(mesh.polygons, "hide", bool)
-    selected = chosen | (values(mesh.polygons, "select", bool) & extend)
-    corners = np.repeat(selected, values(mesh.polygons, "loop_total", np.int32))
-    for elements, of_corner in ((mesh.vertices, "vertex_index"), (mesh.edges, "edge_index")):
-        touched = np.zeros(len(elements), dtype=bool)
-        touched[values(mesh.loops, of_corner, np.int32)[corners]] = True
-        elements.foreach_set("select", touched)
-    mesh.polygons.foreach_set("select", selected)
-    return int(chosen.sum())
+def _select(mesh: bpy.types.Mesh, part: int) -> int:
+    """Select the faces of a part that are to be seen, in Edit Mode; how many."""
+    edit = bmesh.from_edit_mesh(mesh)
+    labels = edit.faces.layers.int.get(note_of(mesh).get("faces", ""))
+    faces = [] if labels is None else [face for face in edit.faces if face[labels] == part and not face.hide]
+    for face in faces:
+        face.select_set(True)
+    bmesh.update_edit_mesh(mesh, loop_triangles=False, destructive=False)
+    return len(faces)

@@ -77,7 +77,7 @@ class WKS_SEGMENT_OT_show_segments(_Shows, bpy.types.Operator):
 
 
 def _hide(mesh: bpy.types.Mesh, hidden: BoolArray) -> None:
-    """Hide these faces, and the vertices and edges that are of hidden faces only; none of them stays selected."""
+    """Hide these faces, and the vertices and edges that are of hidden faces only."""
     corners = np.repeat(hidden, values(mesh.polygons, "loop_total", np.int32))
     for elements, of_corner in ((mesh.vertices, "vertex_index"), (mesh.edges, "edge_index")):
         of = values(mesh.loops, of_corner, np.int32)
@@ -85,7 +85,5 @@ def _hide(mesh: bpy.types.Mesh, hidden: BoolArray) -> None:
         gone[of] = True
         gone[of[~corners]] = False
         elements.foreach_set("hide", gone)
-        elements.foreach_set("select", values(elements, "select", bool) & ~gone)
     mesh.polygons.foreach_set("hide", hidden)
-    mesh.polygons.foreach_set("select", values(mesh.polygons, "select", bool) & ~hidden)
     mesh.update()
