@@ -1,5 +1,8 @@
 """The list of segments: every button does what it says on the data, everywhere, and undo gives back what was."""
 
+import json
+from unittest.mock import MagicMock
+
 import bpy
 import numpy as np
 import pytest
@@ -18,11 +21,11 @@ from builders import (
     snapshot,
 )
 
-from wks_segment.blender import parts, segments, tasks
+from wks_segment.blender import operators, panel_segments, parts, tasks
 from wks_segment.blender.characters import Character
 from wks_segment.blender.edits import by_hand
 from wks_segment.blender.palette import palette
-from wks_segment.core import PoseSegmentation
+from wks_segment.core import PartNotes, PoseSegmentation
 
 pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
@@ -185,8 +188,7 @@ def test_names_are_different_and_an_empty_one_gives_back_the_number(pair, settin
     long = "x" * 80
     activate(settings, 1002).name = long
     assert [item.name for item in settings.segments][2:] == ["x" * 48 + ".L", "x" * 48 + ".R"]
-    assert PoseSegmentation  # what is kept can be read again
-    assert settings.notes().names
+    assert PartNotes.of_json(json.loads(settings.part_notes)) == settings.notes() != PartNotes()
 
 
 def test_a_new_color_is_written_everywhere_and_only_to_that_part(pair, settings):
@@ -427,6 +429,18 @@ def test_faces_assigned_by_hand_keep_their_segment(pair, settings):
     assert settings.faces_by_hand == chosen.sum()
 
 
+def test_only_what_is_in_edit_mode_is_assigned(pair, settings):
+    select(pair[0])
+    activate(settings, 2002)
+    choose(pair[0], np.arange(len(pair[0].data.polygons)) < 9)
+    pair[1].select_set(True)  # as in the outliner; from_pydata selects all of its faces
+    OPS.assign_faces()
+    assert (pair[0].mode, pair[1].mode, pair[1].select_get()) == ("EDIT", "OBJECT", True)
+    np.testing.assert_array_equal(labels_of(pair[1]), bands(pair[1]))
+    choose(pair[0], np.zeros(len(pair[0].data.polygons)))
+    assert OPS.assign_faces() == {"CANCELLED"}
+
+
 def test_corrections_are_kept_by_apply_and_forgotten_on_request(settings):
     objects = limbed_poses(0.0, 0.4)
     select(*objects)
@@ -557,8 +571,7 @@ def test_names_colors_and_corrections_follow_a_model_that_is_learned_again(setti
     other = np.where(labels == 0, 4, np.where(labels == 1, 0, 1))
     other[labels == 1002] = np.arange((labels == 1002).sum()) % 5 + 5
     character = Character((obj,))
-    segments.carry_over(settings, {character: other})
-    tasks.write({character: other}, settings, tasks.Report([]))
+    tasks.write({character: other}, settings, tasks.Report([]), renumbered=True)
     notes = settings.notes()
     assert notes.names[4] == "Legs"
     assert notes.colors == {0: pytest.approx(RED)}
@@ -577,10 +590,47 @@ def test_faces_by_hand_of_a_part_that_is_no_more_are_a_part_of_their_own(setting
     OPS.assign_faces()
     bpy.ops.object.mode_set(mode="OBJECT")
     other = np.arange(len(chosen)) % 3
-    segments.carry_over(settings, {Character((obj,)): other})
-    tasks.write({Character((obj,)): other}, settings, tasks.Report([]))
+    tasks.write({Character((obj,)): other}, settings, tasks.Report([]), renumbered=True)
     np.testing.assert_array_equal(labels_of(obj), np.where(chosen, 500, other))
     assert settings.style().name_of(500) == "Legs"
+
+
+# The panel
+
+
+def drawn(layout):
+    """Icons and operators in what was drawn."""
+    calls = [(call[0].split(".")[-1], call[1], call[2]) for call in layout.mock_calls]
+    return {keys["icon"] for _, _, keys in calls if "icon" in keys}, {
+        of[0] for name, of, _ in calls if name == "operator"
+    }
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+def test_panel_menus_and_rows_can_be_drawn(pair, settings, mode):
+    settings.faces_by_hand = 3
+    bpy.ops.object.mode_set(mode=mode)
+    icons, used = set(), set()
+    for cls in panel_segments.CLASSES:
+        layout = MagicMock()
+        if cls is panel_segments.WKS_SEGMENT_UL_segments:
+            cls.draw_item(MagicMock(), bpy.context, layout, settings, settings.segments[0], 0, settings, "", 0, 0)
+        else:
+            cls.draw(MagicMock(layout=layout), bpy.context)
+        found = drawn(layout)
+        assert layout.mock_calls
+        icons, used = icons | found[0], used | found[1]
+    known = bpy.types.UILayout.bl_rna.functions["operator"].parameters["icon"].enum_items.keys()
+    assert icons <= set(known)
+    assert used <= {cls.bl_idname for cls in operators.CLASSES}
+    assert ("wks_segment.assign_faces" in used) == (mode == "EDIT")
+    assert ("wks_segment.split_segment" in used) == (mode == "OBJECT")
+
+
+def test_panel_says_what_to_do_without_segments(settings):
+    layout = MagicMock()
+    panel_segments.WKS_SEGMENT_PT_segments.draw(MagicMock(layout=layout), bpy.context)
+    assert "learn a model" in str(layout.mock_calls)
 
 
 # Undo

@@ -206,7 +206,7 @@ def _segment(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     if options.model:
         _save(model, options.model)
     if options.output or options.render:
-        _label(model, poses, described, settings, options, report, progress)
+        _label(model, poses, described, settings, options, report, progress, renumbered=True)
         report.warnings += tasks.segment_warnings(model, report)
     settings.keep_model(model, report.facts)
     if options.output:
@@ -323,7 +323,6 @@ def _settings(options: argparse.Namespace) -> WKSSegmentSettings:
     """Default settings, whatever the file holds, with what the command line says."""
     settings: WKSSegmentSettings = bpy.context.scene.wks_segment
     settings.property_unset("write_colors")
-    settings.property_unset("part_notes")
     for name in (OPTIONS | OUTPUT_OPTIONS).values():
         settings.property_unset(name)
         value = getattr(options, name, None)
@@ -338,12 +337,12 @@ def _settings(options: argparse.Namespace) -> WKSSegmentSettings:
 
 def _label(
     model: PoseSegmentation, poses: list[Pose], described: list[Any], settings: WKSSegmentSettings,
-    options: argparse.Namespace, report: Report, progress: Progress,
+    options: argparse.Namespace, report: Report, progress: Progress, renumbered: bool = False,
 ) -> None:  # fmt: skip
     labels = tasks.label(model, poses, described, settings, report, progress)
     if options.output:
         soft = tasks.soften(model, poses, described, labels, settings, report, progress)
-        tasks.write(labels, settings, report, soft)
+        tasks.write(labels, settings, report, soft, renumbered)
     if options.render:
         with report.stage("render"):
             joined = settings.notes().joined

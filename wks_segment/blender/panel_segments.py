@@ -10,11 +10,12 @@ from .panel import SubPanel
 
 PRESETS = {
     "Human": (
-        "Head", "Neck", "Torso", "Hips", "Upper Arm", "Forearm", "Hand", "Thigh", "Shin", "Foot", "Hair", "Clothes",
+        "Head", "Hair", "Neck", "Torso", "Hips", "Arm", "Upper Arm", "Forearm", "Hand", "Leg", "Thigh", "Shin", "Foot",
+        "Clothes",
     ),
     "Quadruped": (
-        "Head", "Ear", "Neck", "Torso", "Tail", "Upper Foreleg", "Lower Foreleg", "Forefoot", "Thigh",
-        "Lower Hind Leg", "Hind Foot",
+        "Head", "Muzzle", "Ear", "Neck", "Torso", "Tail", "Tail Tip", "Leg", "Foreleg", "Hind Leg", "Paw", "Forepaw",
+        "Hind Paw", "Mane",
     ),
 }  # fmt: skip
 """Names to choose from. Sides have theirs from the part: .L and .R."""

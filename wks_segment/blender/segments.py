@@ -30,11 +30,16 @@ SAME = 0.5
 
 
 def labelled(settings: WKSSegmentSettings, everywhere: bool = False) -> list[bpy.types.Object]:
-    """Objects of the scene with labels: the selected ones, or all if none is selected or if all are asked for."""
+    """Objects of the scene with labels: those in Edit Mode, or the selected ones, or all if there are none of either.
+
+    All, too, if all are asked for.
+    """
     found = [obj for obj in mesh_objects(settings.id_data.objects) if obj.library is None and has_labels(obj.data)]
     found = [obj for obj in found if obj.data.library is None]
-    chosen = [obj for obj in found if obj.mode == "EDIT" or obj.select_get()]
-    return found if everywhere or not chosen else chosen
+    if everywhere:
+        return found
+    in_edit_mode = [obj for obj in found if obj.mode == "EDIT"]
+    return in_edit_mode or [obj for obj in found if obj.select_get()] or found
 
 
 def meshes_of(objects: list[bpy.types.Object]) -> list[bpy.types.Mesh]:

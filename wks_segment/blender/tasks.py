@@ -287,9 +287,14 @@ def of_one_mesh(poses: Sequence[Pose]) -> list[list[int]]:
 
 def write(
     labels: dict[Character, IntArray], settings: WKSSegmentSettings, report: Report,
-    soft: dict[Character, dict[int, FloatArray]] | None = None,
+    soft: dict[Character, dict[int, FloatArray]] | None = None, renumbered: bool = False,
 ) -> None:  # fmt: skip
-    """Write labels, and the weights that `soften` gave, to the objects of each character, with the user's edits."""
+    """Write labels, and the weights that `soften` gave, to the objects of each character, with the user's edits.
+
+    If parts may have other numbers than those that are on the objects now, since the model is new, the edits follow.
+    """
+    if renumbered:
+        segments.carry_over(settings, labels)
     notes, written = settings.notes(), [np.zeros(0, dtype=np.int64)]
     style = Style.of(notes)
     with report.stage("write"):

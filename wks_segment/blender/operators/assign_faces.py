@@ -62,9 +62,8 @@ class WKS_SEGMENT_OT_forget_faces(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
         chosen_only = context.mode == "EDIT_MESH"
-        count = 0
+        objects, count = segments.labelled(settings), 0
         with segments.object_mode(context):
-            objects = segments.labelled(settings)
             for mesh in segments.meshes_of(objects):
                 given = by_hand(mesh)
                 forgotten = (given >= 0) & (values(mesh.polygons, "select", bool) | (not chosen_only))
@@ -78,8 +77,9 @@ class WKS_SEGMENT_OT_forget_faces(bpy.types.Operator):
 def _assign(operator: bpy.types.Operator, context: bpy.types.Context, part: int | None) -> set[str]:
     """Give the selected faces to a part; None: to a new one."""
     settings = context.scene.wks_segment
+    # Faces of objects that are not in Edit Mode can be selected too, unseen.
+    objects = [obj for obj in segments.labelled(settings) if obj.mode == "EDIT"]
     with segments.object_mode(context):
-        objects = segments.labelled(settings)
         chosen = {mesh: values(mesh.polygons, "select", bool) for mesh in segments.meshes_of(objects)}
         count = sum(int(selected.sum()) for selected in chosen.values())
         if count:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from .. import segments, tasks
+from .. import tasks
 from . import feedback
 
 
@@ -29,8 +29,7 @@ class WKS_SEGMENT_OT_learn(feedback.AsksFirst, bpy.types.Operator):
             model, described = tasks.learn(poses, settings, report, progress)
             labels = tasks.label(model, poses, described, settings, report, progress)
             soft = tasks.soften(model, poses, described, labels, settings, report, progress)
-            segments.carry_over(settings, labels)
-            tasks.write(labels, settings, report, soft)
+            tasks.write(labels, settings, report, soft, renumbered=True)
             report.warnings += tasks.segment_warnings(model, report)
         names = list(dict.fromkeys(pose.character.name for pose in poses))
         settings.keep_model(model, [f"From {', '.join(names[:3])}{' …' * (len(names) > 3)}", *report.facts[:3]])

@@ -28,9 +28,9 @@ class _Shows:
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
-        count = 0
+        meshes, count = segments.meshes_of(segments.labelled(settings)), 0
         with segments.object_mode(context):
-            for mesh in segments.meshes_of(segments.labelled(settings)):
+            for mesh in meshes:
                 labels = labels_on(mesh)
                 if labels is not None:
                     hidden = self.hidden(labels, values(mesh.polygons, "hide", bool), settings)
