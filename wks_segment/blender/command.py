@@ -11,7 +11,7 @@ from typing import Any
 
 import bpy
 
-from ..core import PoseSegmentation
+from ..core import PartNotes, PoseSegmentation
 from ..core.description import Progress
 from . import demo, files, parts, tasks
 from . import poses as reader
@@ -343,6 +343,8 @@ def _label(
     if options.output:
         soft = tasks.soften(model, poses, described, labels, settings, report, progress)
         tasks.write(labels, settings, report, soft, renumbered)
+    elif renumbered:
+        settings.keep_notes(PartNotes())
     if options.render:
         with report.stage("render"):
             joined = settings.notes().joined

@@ -73,7 +73,7 @@ def run(
     soft = tasks.soften(
         model, training, described, together, settings, report, lambda stage, done: progress(stage, 0.5)
     )
-    tasks.write(together, settings, report, soft)
+    tasks.write(together, settings, report, soft, renumbered=True)
     counted = report.n_segments, report.parts
 
     def later(stage: str, done: float) -> None:
