@@ -10,7 +10,15 @@ from . import command, operators, panel, panel_segments
 from .segment_item import WKSSegmentItem
 from .settings import WKSSegmentSettings
 
-CLASSES = (WKSSegmentItem, WKSSegmentSettings, *operators.CLASSES, *panel.CLASSES, *panel_segments.CLASSES)
+CLASSES = (
+    WKSSegmentItem,
+    WKSSegmentSettings,
+    *operators.CLASSES,
+    # Sub-panels stand in the order of their registration.
+    panel.CLASSES[0],
+    *panel_segments.CLASSES,
+    *panel.CLASSES[1:],
+)
 COMMAND = "wks_segment"
 
 _commands: list[Any] = []
