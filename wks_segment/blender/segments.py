@@ -34,8 +34,8 @@ def labelled(settings: WKSSegmentSettings, everywhere: bool = False) -> list[bpy
 
     All, too, if all are asked for.
     """
-    found = [obj for obj in mesh_objects(settings.id_data.objects) if obj.library is None and has_labels(obj.data)]
-    found = [obj for obj in found if obj.data.library is None]
+    ours = [obj for obj in settings.id_data.objects if obj.type == "MESH" and has_labels(obj.data)]
+    found = [obj for obj in mesh_objects(ours) if obj.library is None and obj.data.library is None]
     if everywhere:
         return found
     in_edit_mode = [obj for obj in found if obj.mode == "EDIT"]

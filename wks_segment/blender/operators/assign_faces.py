@@ -33,7 +33,9 @@ class WKS_SEGMENT_OT_new_segment(bpy.types.Operator):
     bl_label = "New Segment from Faces"
     bl_options = {"REGISTER", "UNDO"}
 
-    name: StringProperty(name="Name", description="What the segment is called", default="New Segment")
+    name: StringProperty(
+        name="Name", description="What the segment is called", default="New Segment", options={"SKIP_SAVE"}
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

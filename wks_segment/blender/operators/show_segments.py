@@ -48,7 +48,10 @@ class WKS_SEGMENT_OT_hide_segment(_Shows, bpy.types.Operator):
     bl_idname = "wks_segment.hide_segment"
     bl_label = "Hide or Show Segment"
 
-    part: IntProperty(name="Segment", description="Number of the segment; -1: the active one", default=-1, min=-1)
+    part: IntProperty(
+        name="Segment", description="Number of the segment; -1: the active one", default=-1, min=-1,
+        options={"SKIP_SAVE"},
+    )  # fmt: skip
 
     def hidden(self, labels: IntArray, before: BoolArray, settings: bpy.types.PropertyGroup) -> BoolArray:
         part = self.part if self.part >= 0 else segments.active_part(settings)
