@@ -80,7 +80,7 @@ def run() -> dict[str, dict[str, float]]:
     timed("mixture", lambda: model.fit(described))
     wanted = timed("read meshes", lambda: Wanted.of(settings, (pose.character for pose in poses)))
     labels = timed("label", lambda: tasks.label(model, poses, described, wanted, report, quiet))
-    timed("write", lambda: tasks.write(labels, wanted, report))
+    timed("write", lambda: tasks.write(settings, labels, wanted, report))
     return stages
 
 

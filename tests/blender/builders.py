@@ -118,6 +118,31 @@ def select(*objects):
     bpy.context.view_layer.objects.active = objects[0] if objects else None
 
 
+def choose(obj, chosen):
+    """Select faces in Edit Mode."""
+    if bpy.context.mode == "OBJECT":
+        bpy.ops.object.mode_set(mode="EDIT")
+    bpy.context.scene.tool_settings.mesh_select_mode = (False, False, True)
+    faces = bmesh.from_edit_mesh(obj.data)
+    for face in faces.faces:
+        face.select_set(bool(chosen[face.index]))
+    faces.select_flush_mode()
+    bmesh.update_edit_mesh(obj.data)
+
+
+def chosen_in_edit_mode(obj):
+    """Whether each face and each vertex is selected."""
+    found = bmesh.from_edit_mesh(obj.data)
+    return np.array([face.select for face in found.faces]), np.array([vertex.select for vertex in found.verts])
+
+
+def add_face(mesh):
+    """Add a loose triangle in Edit Mode."""
+    found = bmesh.from_edit_mesh(mesh)
+    found.faces.new([found.verts.new(place) for place in ((9, 0, 0), (9, 1, 0), (9, 0, 1))])
+    bmesh.update_edit_mesh(mesh)
+
+
 def coordinates(mesh):
     """(n, 3) array of a mesh's own coordinates."""
     points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
@@ -186,7 +211,14 @@ def scene_snapshot():
         "active": context.view_layer.objects.active,
         "frame": (context.scene.frame_current, context.scene.frame_subframe),
         "model": (context.scene.wks_segment.model, context.scene.wks_segment.model_summary),
+        "notes": context.scene.wks_segment.part_notes,
+        "segments": listed(context.scene.wks_segment),
     }
+
+
+def listed(settings):
+    """The list of segments, as it is seen."""
+    return [(item.number, item.name, round(item.share, 3), item.hidden) for item in settings.segments]
 
 
 def changes(before, after, path=""):

@@ -10,6 +10,7 @@ from wks_segment.blender.errors import UserError
 from wks_segment.blender.palette import palette
 from wks_segment.blender.picture import TILE, Tile, render_poses
 from wks_segment.blender.poses import Character
+from wks_segment.blender.style import Style
 
 pytestmark = pytest.mark.usefixtures("scene", "needs_rendering")
 SHOWN = (0, 3, 7)
@@ -65,6 +66,14 @@ def test_picture_shows_each_pose_in_the_colours_of_its_parts(tmp_path):
         assert share_of(1, half) < 0.002
         background = np.abs(half - half[2, 2]).max(axis=-1) < 0.02
         assert 0.3 < background.mean() < 0.95
+
+
+def test_picture_shows_the_colours_that_the_user_gave(tmp_path):
+    path, given = tmp_path / "poses.png", {part: palette()[1] for part in SHOWN}
+    render_poses(tiles(1), path, style=Style(colors=given))
+    image = pixels(path)
+    assert share_of(1, image) > 0.03
+    assert all(share_of(component, image) < 0.002 for component in SHOWN)
 
 
 def test_poses_stand_in_rows(tmp_path):

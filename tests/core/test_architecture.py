@@ -39,6 +39,7 @@ CHAIN = [
     "grouping",
     "learning",
     "region_atlas",
+    "part_notes",
     "model_file",
     "segmentation",
 ]

@@ -6,11 +6,20 @@ from typing import Any
 
 import bpy
 
-from . import command, operators, panel, session
+from . import command, operators, panel, panel_segments, session
 from .jobs import HOLDER, Desk
+from .segment_item import WKSSegmentItem
 from .settings import WKSSegmentSettings
 
-CLASSES = (WKSSegmentSettings, *operators.CLASSES, *panel.CLASSES)
+CLASSES = (
+    WKSSegmentItem,
+    WKSSegmentSettings,
+    *operators.CLASSES,
+    # Sub-panels stand in the order of their registration.
+    panel.CLASSES[0],
+    *panel_segments.CLASSES,
+    *panel.CLASSES[1:],
+)
 COMMAND = "wks_segment"
 
 _commands: list[Any] = []

@@ -11,11 +11,12 @@ from typing import Any
 
 import bpy
 
-from ..core import PoseSegmentation
+from ..core import PartNotes, PoseSegmentation
 from ..core.description import Progress
 from . import demo, files, parts, tasks
 from . import poses as reader
 from .characters import Character, armature_of, group, mesh_objects
+from .edits import merged
 from .errors import UserError
 from .picture import Tile, render_poses
 from .poses import Pose
@@ -207,7 +208,7 @@ def _segment(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     if options.model:
         _save(model, options.model)
     if options.output or options.render:
-        _label(model, poses, described, settings, options, report, progress)
+        _label(model, poses, described, settings, options, report, progress, renumbered=True)
         report.warnings += segment_warnings(model, report)
     settings.keep_model(model, report.facts)
     if options.output:
@@ -225,6 +226,7 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     report.tell_of(model)
     poses = _read(options, report)
     settings = _settings(options)
+    settings.keep_notes(model.part_notes_)
     if options.smoothness is not None:
         model.smoothness = settings.smoothness
     tasks.check_limits(model, poses, settings)
@@ -337,7 +339,7 @@ def _settings(options: argparse.Namespace) -> WKSSegmentSettings:
 
 def _label(
     model: PoseSegmentation, poses: list[Pose], described: list[Any], settings: WKSSegmentSettings,
-    options: argparse.Namespace, report: Report, progress: Progress,
+    options: argparse.Namespace, report: Report, progress: Progress, renumbered: bool = False,
 ) -> None:  # fmt: skip
     def at_end(stage: str, share: float) -> None:
         progress(stage, 1.0)
@@ -346,10 +348,14 @@ def _label(
     labels = tasks.label(model, poses, described, wanted, report, at_end)
     if options.output:
         soft = tasks.soften(model, poses, described, labels, wanted, report, at_end)
-        tasks.write(labels, wanted, report, soft)
+        tasks.write(settings, labels, wanted, report, soft, renumbered)
+    elif renumbered:
+        settings.keep_notes(PartNotes())
     if options.render:
         with report.stage("render"):
-            render_poses([Tile(pose, labels[pose.character], pose.name) for pose in poses], options.render)
+            joined = settings.notes().joined
+            tiles = [Tile(pose, merged(labels[pose.character], joined), pose.name) for pose in poses]
+            render_poses(tiles, options.render, style=settings.style())
 
 
 def _save(model: PoseSegmentation, path: Path) -> None:

@@ -73,7 +73,7 @@ def run(
     described = tasks.learn(model, training, report, lambda stage, done: progress(stage, 0.5 * done))
     together = tasks.label(model, training, described, wanted, report, lambda stage, done: progress(stage, 0.5))
     soft = tasks.soften(model, training, described, together, wanted, report, lambda stage, done: progress(stage, 0.5))
-    tasks.write(together, wanted, report, soft)
+    tasks.write(settings, together, wanted, report, soft, renumbered=True)
     counted = report.n_segments, report.parts
 
     def later(stage: str, done: float) -> None:

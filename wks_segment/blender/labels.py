@@ -22,6 +22,10 @@ OWN_MATERIALS = "wks_segment_own_material"
 """Face attribute that keeps the material index of each face from before ours."""
 NOTE = "wks_segment_note"
 """Custom property of a mesh: which attributes and vertex groups are ours, and what was active before."""
+ATTRIBUTES = ("faces", "vertices", "colors", "own_materials", "model_labels")
+"""Keys of the note under which names of attributes stand that new labels replace."""
+LASTING = ("by_hand",)
+"""Keys of the note under which names of attributes stand that outlast new labels, until Clear."""
 COMPONENT = "wks_segment_component"
 """Custom property of our materials: the part that they show."""
 
@@ -37,11 +41,12 @@ def write_labels(
     the user that happen to have our names are left alone: ours get a number.
     """
     shown = None if weights is None else active_group(mesh)
-    clear_labels(mesh)
+    note = note_of(mesh)
+    _take_back(mesh, note)
     # The note comes first and grows with what is written, so that Clear also mends a run that broke off.
-    mesh[NOTE] = {}
-    _write_ints(mesh, "faces", FACES, "FACE", labels)
-    _write_ints(mesh, "vertices", VERTICES, "POINT", _at_vertices(mesh, labels))
+    mesh[NOTE] = {key: note[key] for key in LASTING if key in note}
+    write_ints(mesh, "faces", FACES, "FACE", labels)
+    write_ints(mesh, "vertices", VERTICES, "POINT", _at_vertices(mesh, labels))
     if colors:
         active = mesh.color_attributes.active_color
         mesh[NOTE]["active_color"] = active.name if active is not None else ""
@@ -51,7 +56,7 @@ def write_labels(
         mesh[NOTE]["first_slot"] = len(mesh.materials)
         before = np.empty(len(mesh.polygons), dtype=np.int32)
         mesh.polygons.foreach_get("material_index", before)
-        _write_ints(mesh, "own_materials", OWN_MATERIALS, "FACE", before)
+        write_ints(mesh, "own_materials", OWN_MATERIALS, "FACE", before)
         _write_materials(mesh, labels, style)
     if weights is not None:
         write_groups(mesh, weights, mesh[NOTE], style, shown)
@@ -62,10 +67,22 @@ def clear_labels(mesh: bpy.types.Mesh) -> bool:
     """Remove exactly what `write_labels` wrote and restore what was there; False if there was nothing."""
     if not has_labels(mesh):
         return False
-    note = mesh[NOTE].to_dict()
+    note = note_of(mesh)
+    _take_back(mesh, note)
+    for key in LASTING:
+        attribute = mesh.attributes.get(note.get(key, ""))
+        if attribute is not None:
+            mesh.attributes.remove(attribute)
+    del mesh[NOTE]
+    mesh.update()
+    return True
+
+
+def _take_back(mesh: bpy.types.Mesh, note: dict[str, Any]) -> None:
+    """Remove what `write_labels` wrote."""
     if "first_slot" in note:
         _restore_materials(mesh, note)
-    for key in ("faces", "vertices", "colors", "own_materials"):
+    for key in ATTRIBUTES:
         attribute = mesh.attributes.get(note.get(key, ""))
         if attribute is not None:
             mesh.attributes.remove(attribute)
@@ -75,9 +92,6 @@ def clear_labels(mesh: bpy.types.Mesh) -> bool:
     if active is not None:
         mesh.color_attributes.active_color = active
     remove_groups(mesh, note)
-    del mesh[NOTE]
-    mesh.update()
-    return True
 
 
 def has_labels(mesh: bpy.types.Mesh) -> bool:
@@ -85,9 +99,29 @@ def has_labels(mesh: bpy.types.Mesh) -> bool:
     return NOTE in mesh and hasattr(mesh[NOTE], "to_dict")
 
 
+def note_of(mesh: bpy.types.Mesh) -> dict[str, Any]:
+    """What is noted on a mesh, to read; empty if there is nothing of ours."""
+    return mesh[NOTE].to_dict() if has_labels(mesh) else {}
+
+
+def labels_on(mesh: bpy.types.Mesh) -> IntArray | None:
+    """(p,) parts of a mesh's polygons, as they were written; None if there are none."""
+    return read_ints(mesh, note_of(mesh).get("faces", ""))
+
+
+def read_ints(mesh: bpy.types.Mesh, name: str) -> IntArray | None:
+    """(p,) values of an int attribute of faces; None if there is none of that name."""
+    attribute = mesh.attributes.get(name)
+    if attribute is None or (attribute.data_type, attribute.domain) != ("INT", "FACE"):
+        return None
+    values = np.empty(len(attribute.data), dtype=np.int32)
+    attribute.data.foreach_get("value", values)
+    return values.astype(np.int64)
+
+
 def own_material_index(mesh: bpy.types.Mesh) -> IntArray:
     """(p,) material slot of each polygon, without what `write_labels` wrote: the slots that Clear leaves."""
-    note = mesh[NOTE].to_dict() if has_labels(mesh) else {}
+    note = note_of(mesh)
     now = np.empty(len(mesh.polygons), dtype=np.int32)
     mesh.polygons.foreach_get("material_index", now)
     ours = _our_slots(mesh, note)
@@ -100,7 +134,7 @@ def own_material_index(mesh: bpy.types.Mesh) -> IntArray:
     return np.where(np.isin(now, ours), own, moved)
 
 
-def _write_ints(mesh: bpy.types.Mesh, key: str, name: str, domain: str, values: NDArray[np.integer[Any]]) -> None:
+def write_ints(mesh: bpy.types.Mesh, key: str, name: str, domain: str, values: NDArray[np.integer[Any]]) -> None:
     """Add an int attribute and note the name that it got: a name that is taken gets a number."""
     attribute = mesh.attributes.new(free_name(mesh, name), "INT", domain)
     mesh[NOTE][key] = attribute.name
@@ -150,12 +184,20 @@ def _material(part: int, style: Style) -> bpy.types.Material:
             return material
     material = bpy.data.materials.new(style.name_of(part))
     material[COMPONENT] = part
-    color = (*linear(style.colors_of(np.array([part]))[0]).tolist(), 1.0)
-    material.diffuse_color = color
     if bpy.app.version < (5, 0, 0):  # from then on always true, and touching it warns
         material.use_nodes = True
-    material.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = color
+    recolor_material(material, part, style)
     return material
+
+
+def recolor_material(material: bpy.types.Material, part: int, style: Style) -> None:
+    """Give a material the colour of a part, in solid view and where its shader has a colour of its own."""
+    color = (*linear(style.colors_of(np.array([part]))[0]).tolist(), 1.0)
+    material.diffuse_color = color
+    for node in material.node_tree.nodes if material.node_tree is not None else ():
+        base = node.inputs.get("Base Color")
+        if base is not None and not base.is_linked:
+            base.default_value = color
 
 
 def _restore_materials(mesh: bpy.types.Mesh, note: dict[str, Any]) -> None:

@@ -32,6 +32,11 @@ def marked_pairs(character: Character, kinds: Collection[str]) -> IntArray | Non
     return np.concatenate([polygons.start + _pairs_of_mesh(obj.data, kinds) for obj, polygons in ranges])
 
 
+def neighbours(mesh: bpy.types.Mesh) -> IntArray:
+    """(q, 2) polygons of a mesh that share an edge, also across split vertices."""
+    return _neighbours(mesh, _welded_edges(mesh)[0])[0]
+
+
 def _pairs_of_mesh(mesh: bpy.types.Mesh, kinds: Collection[str]) -> IntArray:
     edge, count = _welded_edges(mesh)
     pairs, between = _neighbours(mesh, edge)

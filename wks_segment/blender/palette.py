@@ -110,6 +110,12 @@ def colors_of(parts: IntArray) -> FloatArray:
     return sided_palette()[sides_of(parts), segments_of(parts) % MAX_COLOURS]
 
 
+def most_different(used: FloatArray) -> FloatArray:
+    """(3,) the sRGB color of the palette that is, to the eye, as far as can be from the (k, 3) used ones."""
+    apart = np.linalg.norm(oklab(palette())[:, None] - oklab(used), axis=2)
+    return np.asarray(palette()[int(apart.min(axis=1).argmax())])
+
+
 def linear(srgb: FloatArray) -> FloatArray:
     """(…, 3) sRGB colours in linear light, as materials take them."""
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)

@@ -109,14 +109,14 @@ class WKS_SEGMENT_PT_main(_Sidebar, bpy.types.Panel):
         self.layout.operator("wks_segment.clear", icon="X")
 
 
-class _SubPanel(_Sidebar):
+class SubPanel(_Sidebar):
     """A part of the panel that starts closed."""
 
     bl_parent_id = WKS_SEGMENT_PT_main.bl_idname
     bl_options = {"DEFAULT_CLOSED"}
 
 
-class WKS_SEGMENT_PT_outputs(_SubPanel, bpy.types.Panel):
+class WKS_SEGMENT_PT_outputs(SubPanel, bpy.types.Panel):
     """What is written."""
 
     bl_label = "Outputs"
@@ -125,7 +125,7 @@ class WKS_SEGMENT_PT_outputs(_SubPanel, bpy.types.Panel):
         self.settings(context, "write_colors", "write_materials", "vertex_groups")
 
 
-class WKS_SEGMENT_PT_model(_SubPanel, bpy.types.Panel):
+class WKS_SEGMENT_PT_model(SubPanel, bpy.types.Panel):
     """The learned model."""
 
     bl_label = "Model"
@@ -139,7 +139,7 @@ class WKS_SEGMENT_PT_model(_SubPanel, bpy.types.Panel):
         row.operator("wks_segment.save_model", text="Save", icon="EXPORT")
 
 
-class WKS_SEGMENT_PT_advanced(_SubPanel, bpy.types.Panel):
+class WKS_SEGMENT_PT_advanced(SubPanel, bpy.types.Panel):
     """What most users leave as it is."""
 
     bl_label = "Advanced"

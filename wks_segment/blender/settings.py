@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any, Literal
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ..core import PoseSegmentation
+from ..core import PartNotes, PoseSegmentation
 from .certainty import certainty_lines
 from .errors import UserError
 from .palette import MAX_COLOURS
+from .segment_item import WKSSegmentItem
 from .session import session_of
+from .style import Style
 
 TUNED: dict[str, dict[str, Any]] = {
     "n_segments": {
@@ -234,6 +237,19 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         """Segments, as a model takes them."""
         return "auto" if self.auto_segments else self.n_segments
 
+    segments: CollectionProperty(
+        type=WKSSegmentItem, name="Segments", description="The segments of the selected objects, or else of all"
+    )
+    active_segment: IntProperty(
+        name="Active Segment", description="The segment that the buttons below are about", min=0, max=3000
+    )
+    faces_by_hand: IntProperty(
+        options={"HIDDEN"}, description="How many faces of these objects have a segment by hand", min=0, max=999_999
+    )
+    part_notes: StringProperty(
+        options={"HIDDEN"}, description="Names and colors of segments, and which are merged, as JSON"
+    )
+
     def new_model(self) -> PoseSegmentation:
         """An unfitted model with these settings; UserError if they exclude each other."""
         parameters: dict[str, Any] = {name: getattr(self, name) for name in MODEL_PARAMETERS}
@@ -245,6 +261,22 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
                 )
             parameters["n_segments"] = "auto"
         return PoseSegmentation(**parameters)
+
+    def notes(self) -> PartNotes:
+        """What the user has noted on the parts of the model; nothing if somebody damaged it."""
+        try:
+            return PartNotes.of_json(json.loads(self.part_notes or "{}"))
+        except ValueError:
+            return PartNotes()
+
+    def keep_notes(self, notes: PartNotes) -> None:
+        """Store what the user notes on parts in the scene."""
+        fields = notes.as_json()
+        self.part_notes = json.dumps(fields) if fields else ""
+
+    def style(self) -> Style:
+        """Names and colours of parts as the user has them."""
+        return Style.of(self.notes())
 
     def keep_model(self, model: PoseSegmentation, summary: list[str]) -> None:
         """Store a fitted model in the scene, with a few lines on where it is from and its number of segments."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..core import PartNotes
 from ..core.mesh import FloatArray, IntArray
 from . import palette, parts
 
@@ -25,6 +26,11 @@ class Style:
 
     names: Mapping[int, str] = field(default_factory=dict)
     colors: Mapping[int, FloatArray] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, notes: PartNotes) -> Style:
+        """As a user has noted it."""
+        return cls(notes.names, {part: np.array(color) for part, color in notes.colors.items()})
 
     def name_of(self, part: int) -> str:
         """As a person reads it."""

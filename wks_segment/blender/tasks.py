@@ -17,16 +17,17 @@ from ..core.description import Progress
 from ..core.memory import available_memory
 from ..core.mesh import FloatArray, IntArray
 from ..core.segmentation import DESCRIBED
-from . import parts
+from . import parts, segments
 from . import poses as reader
 from .bodies import Body
 from .characters import Character
+from .edits import write_edited
 from .errors import TooLargeError, UserError
-from .labels import write_labels
 from .poses import Pose
 from .report import Report
 from .settings import WKSSegmentSettings
-from .weights import by_parts, hard_weights, soft_weights
+from .style import Style
+from .weights import by_parts, soft_weights
 
 VOTERS = 5
 """Poses of a mesh that say which of its parts are left and right; more would not say it more surely."""
@@ -247,10 +248,17 @@ def of_one_mesh(poses: Sequence[Pose]) -> list[list[int]]:
 
 
 def write(
-    labels: dict[Character, IntArray], wanted: Wanted, report: Report,
-    soft: dict[Character, dict[int, FloatArray]] | None = None,
+    settings: WKSSegmentSettings, labels: dict[Character, IntArray], wanted: Wanted, report: Report,
+    soft: dict[Character, dict[int, FloatArray]] | None = None, renumbered: bool = False,
 ) -> None:  # fmt: skip
-    """Write labels, and the weights that `soften` gave, to the objects of each character."""
+    """Write labels, and the weights that `soften` gave, to the objects of each character, with the user's edits.
+
+    If parts may have other numbers than those that are on the objects now, since the model is new, the edits follow.
+    """
+    if renumbered:
+        segments.carry_over(settings, labels)
+    notes, written = settings.notes(), [np.zeros(0, dtype=np.int64)]
+    style = Style.of(notes)
     with report.stage("write"):
         for character, values in labels.items():
             ranges = zip(reader.polygon_ranges(character), reader.vertex_ranges(character), strict=True)
@@ -258,9 +266,13 @@ def write(
                 if polygons.stop == polygons.start:
                     continue
                 weights = None if soft is None else {part: of[vertices] for part, of in soft[character].items()}
-                if wanted.vertex_groups == "hard":
-                    weights = hard_weights(obj.data, values[polygons])
-                write_labels(obj.data, values[polygons], wanted.colors, wanted.materials, weights)
+                final = write_edited(
+                    obj.data, values[polygons], style, notes.joined, wanted.colors, wanted.materials, weights,
+                    hard=wanted.vertex_groups == "hard",
+                )  # fmt: skip
+                written.append(final)
+        segments.fill(settings)
+    report.parts = {style.name_of(part): part for part in parts.among(np.concatenate(written))}
 
 
 def stored_model(settings: WKSSegmentSettings) -> PoseSegmentation:

@@ -38,7 +38,7 @@ def write_groups(
         found = parts.among(np.array([part for part, of_part in weights.items() if of_part.any()], dtype=np.int64))
         names = [NAME.format(style.name_of(part)) for part in found]
         groups = [holder.vertex_groups.new(name=_free_name(holder, name)) for name in names]
-        note["vertex_groups"] = [group.name for group in groups]
+        note["vertex_groups"], note["group_parts"] = [group.name for group in groups], found
         for part, group in zip(found, groups, strict=True):
             _fill(group, weights[part].astype(np.float32))
         _activate(holder, shown, note["active_group"], *note["vertex_groups"])
@@ -57,6 +57,34 @@ def remove_groups(mesh: bpy.types.Mesh, note: dict[str, Any]) -> None:
             if group is not None:
                 holder.vertex_groups.remove(group)
         _activate(holder, shown)
+
+
+def read_groups(mesh: bpy.types.Mesh, note: Mapping[str, Any]) -> dict[int, FloatArray]:
+    """For each part that has a group of ours, the (n,) weights in it."""
+    found: dict[int, tuple[int, FloatArray]] = {}
+    with _holder(mesh) as holder:
+        for name, part in zip(note.get("vertex_groups", []), note.get("group_parts", []), strict=False):
+            group = holder.vertex_groups.get(name)
+            if group is not None:
+                found[group.index] = part, np.zeros(len(mesh.vertices))
+    for i, vertex in enumerate(mesh.vertices):
+        for member in vertex.groups:
+            if member.group in found:
+                found[member.group][1][i] = member.weight
+    return dict(found.values())
+
+
+def rename_group(mesh: bpy.types.Mesh, note: Any, part: int, style: Style) -> None:
+    """Call the group of a part, if there is one of ours, as the style does."""
+    names = list(note.get("vertex_groups", []))
+    of_part = dict(zip(note.get("group_parts", []), range(len(names)), strict=False))
+    with _holder(mesh) as holder:
+        group = holder.vertex_groups.get(names[of_part[part]]) if part in of_part else None
+        wanted = NAME.format(style.name_of(part))
+        if group is not None and group.name != wanted:
+            group.name = _free_name(holder, wanted)
+            names[of_part[part]] = group.name
+            note["vertex_groups"] = names
 
 
 def active_group(mesh: bpy.types.Mesh) -> str | None:

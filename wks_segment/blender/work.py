@@ -147,8 +147,10 @@ class Work:
     def write(self) -> None:
         """Write labels, and a learned model; ChangedError, and nothing written, if what was read has changed."""
         self.watch.look()
-        tasks.write(self.labels, self.wanted, self.report, self._soft)
         settings = self.watch.scene().wks_segment
+        # Another number of segments numbers them otherwise, as another model does.
+        renumbered = self.learns or self.first is not None
+        tasks.write(settings, self.labels, self.wanted, self.report, self._soft, renumbered)
         if self.learns:
             names = list(dict.fromkeys(pose.character.name for pose in self.poses))
             origin = f"From {', '.join(names[:3])}{' …' * (len(names) > 3)}"

@@ -6,6 +6,7 @@ from .laplacian import mass_matrix, stiffness_matrix
 from .mesh import TriangleMesh
 from .mixture import GaussianMixture, fit_mixture
 from .model_file import ModelFileError
+from .part_notes import PartNotes
 from .pose_signature import PoseSignature
 from .segmentation import PoseSegmentation
 from .signature import heat_kernel_signature, wave_kernel_signature
@@ -19,6 +20,7 @@ __all__ = [
     "GaussianMixture",
     "MemoryCache",
     "ModelFileError",
+    "PartNotes",
     "PoseSegmentation",
     "PoseSignature",
     "SignatureCache",

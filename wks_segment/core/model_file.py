@@ -12,6 +12,7 @@ import numpy as np
 
 from .mesh import FloatArray, IntArray
 from .mixture import CovarianceType
+from .part_notes import PartNotes
 from .region_atlas import FIELDS, PLANES
 
 FORMAT = "wks_segment model"
@@ -36,21 +37,23 @@ class ModelFileError(ValueError):
 
 
 def encode(
-    parameters: dict[str, Any], arrays: dict[str, FloatArray | IntArray], covariance_type: CovarianceType
-) -> str:
+    parameters: dict[str, Any], arrays: dict[str, FloatArray | IntArray], covariance_type: CovarianceType,
+    notes: PartNotes,
+) -> str:  # fmt: skip
     """JSON text of a model."""
     content = {
         "format": FORMAT,
         "version": VERSION,
         "parameters": parameters,
         "mixture_covariance_type": covariance_type,
+        **notes.as_json(),
         **{name: array.tolist() for name, array in arrays.items()},
     }
     return json.dumps(content, default=_plain, allow_nan=False)
 
 
-def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], CovarianceType]:
-    """Parameters, arrays and covariance type of a model, all checked; ModelFileError if anything is off."""
+def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], CovarianceType, PartNotes]:
+    """Parameters, arrays, covariance type and notes of a model, all checked; ModelFileError if anything is off."""
     try:
         content = json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -109,7 +112,11 @@ def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], Covariance
         raise ModelFileError("the model is damaged: a variance or a weight is not positive")
     if abs(arrays["weights"].sum() - 1) > 1e-6:
         raise ModelFileError("the model is damaged: the weights do not sum to 1")
-    return parameters, arrays, covariance_type
+    try:
+        notes = PartNotes.of_json(content)
+    except ValueError as error:
+        raise ModelFileError(f"the model is damaged: {error}") from error
+    return parameters, arrays, covariance_type, notes
 
 
 def _n_components(content: dict[str, Any], n_segments: Any) -> int:

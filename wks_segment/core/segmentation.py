@@ -24,6 +24,7 @@ from .laplacian import unit_area_masses
 from .learning import AUTO, MIN_SHARE, SMOOTHING_LENGTH, Candidates, fine_mixtures, of_one_mesh
 from .mesh import FloatArray, IntArray, TriangleMesh
 from .mixture import CovarianceType, GaussianMixture, drawn_evenly, fit_mixtures
+from .part_notes import PartNotes
 from .pose_signature import PoseSignature
 from .region_atlas import FIELDS, RegionAtlas, Regions, Traits, side_field, sides_of_parts
 from .regions import FaceAdjacency, connected_regions
@@ -105,6 +106,8 @@ class PoseSegmentation(PoseDescriber):
         Segments found.
     centre_, spread_ : (n_energies,) arrays
         Mean and standard deviation of the training signatures over the area.
+    part_notes_ : PartNotes
+        Names and colours that a user gave the parts, and which are one: kept with the model, and no more.
     """
 
     def __init__(
@@ -200,6 +203,7 @@ class PoseSegmentation(PoseDescriber):
             tick("regions", GROUPED + (1 - GROUPED) * share)
 
         wanted, covariance_type = self._least_components(), self._setting("covariance_type")
+        self.part_notes_ = PartNotes()
         self.grouping_: Grouping | None = None
         self.regions_: RegionAtlas | None = None
         if self.preset == "paper":
@@ -432,13 +436,15 @@ class PoseSegmentation(PoseDescriber):
             {name: getattr(self, name) for name in model_file.PARAMETERS},
             arrays,
             mixture.covariance_type,
+            self.part_notes_,
         )
 
     @classmethod
     def from_json(cls, text: str) -> PoseSegmentation:
         """The model in JSON text; ModelFileError if it is none."""
-        parameters, arrays, covariance_type = model_file.decode(text)
+        parameters, arrays, covariance_type, notes = model_file.decode(text)
         model = cls(**parameters)
+        model.part_notes_ = notes
         try:
             model._check_parameters()
         except (ValueError, TypeError) as error:

@@ -2,12 +2,19 @@
 
 from .accept import WKS_SEGMENT_OT_accept
 from .apply import WKS_SEGMENT_OT_apply
+from .assign_faces import WKS_SEGMENT_OT_assign_faces, WKS_SEGMENT_OT_forget_faces, WKS_SEGMENT_OT_new_segment
 from .cancel import WKS_SEGMENT_OT_cancel
 from .clear import WKS_SEGMENT_OT_clear
 from .discard import WKS_SEGMENT_OT_discard
 from .learn import WKS_SEGMENT_OT_learn
 from .load_model import WKS_SEGMENT_OT_load_model
+from .merge_segments import WKS_SEGMENT_OT_merge_segments
+from .name_segment import WKS_SEGMENT_OT_name_segment
+from .restore_segments import WKS_SEGMENT_OT_refresh_segments, WKS_SEGMENT_OT_restore_segments
 from .save_model import WKS_SEGMENT_OT_save_model
+from .select_segment import WKS_SEGMENT_OT_select_segment
+from .show_segments import WKS_SEGMENT_OT_hide_segment, WKS_SEGMENT_OT_isolate_segment, WKS_SEGMENT_OT_show_segments
+from .split_segment import WKS_SEGMENT_OT_split_segment
 from .update import WKS_SEGMENT_OT_update
 
 CLASSES = (
@@ -20,4 +27,16 @@ CLASSES = (
     WKS_SEGMENT_OT_clear,
     WKS_SEGMENT_OT_save_model,
     WKS_SEGMENT_OT_load_model,
+    WKS_SEGMENT_OT_select_segment,
+    WKS_SEGMENT_OT_hide_segment,
+    WKS_SEGMENT_OT_isolate_segment,
+    WKS_SEGMENT_OT_show_segments,
+    WKS_SEGMENT_OT_name_segment,
+    WKS_SEGMENT_OT_merge_segments,
+    WKS_SEGMENT_OT_split_segment,
+    WKS_SEGMENT_OT_restore_segments,
+    WKS_SEGMENT_OT_refresh_segments,
+    WKS_SEGMENT_OT_assign_faces,
+    WKS_SEGMENT_OT_new_segment,
+    WKS_SEGMENT_OT_forget_faces,
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from .. import segments
 from ..characters import mesh_objects
 from ..labels import clear_labels, has_labels
 from . import feedback
@@ -29,6 +30,7 @@ class WKS_SEGMENT_OT_clear(bpy.types.Operator):
         meshes = {obj.data for obj in mesh_objects(context.selected_objects) if obj.data.library is None}
         cleared = sum(clear_labels(mesh) for mesh in meshes)
         context.scene.wks_segment.applied = ""
+        segments.fill(context.scene.wks_segment)
         if not any(has_labels(mesh) for mesh in bpy.data.meshes):
             feedback.hide_colors(context)
         self.report({"INFO"}, f"Cleared the segments of {cleared} mesh{'es' * (cleared != 1)}")

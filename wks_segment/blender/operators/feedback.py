@@ -8,6 +8,7 @@ from contextlib import contextmanager
 import bpy
 
 from ...core.description import Progress
+from .. import segments
 from ..characters import mesh_objects, why_no_mesh
 from ..jobs import BUSY, desk_of
 from ..report import Report
@@ -15,6 +16,9 @@ from ..session import session_of
 
 LOOK = "VERTEX"
 """Color mode of solid shading that shows the color attribute."""
+
+MODES = {"OBJECT": "Object Mode", "EDIT_MESH": "Edit Mode"}
+"""What artists call modes."""
 
 
 @contextmanager
@@ -85,6 +89,17 @@ def no_job_runs(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bo
     """For `poll`: whether no job is running; sets the message if one is."""
     if desk_of(context).job is not None:
         cls.poll_message_set(BUSY)
+        return False
+    return True
+
+
+def has_segments(cls: type[bpy.types.Operator], context: bpy.types.Context, modes: str = "OBJECT EDIT_MESH") -> bool:
+    """For `poll`: whether there is a segment in the list and the mode is one of these; sets the message if not."""
+    if context.mode not in modes.split():
+        cls.poll_message_set(f"Switch to {' or '.join(MODES[mode] for mode in modes.split())} first")
+        return False
+    if segments.active_part(context.scene.wks_segment) is None:
+        cls.poll_message_set("No segments yet: use Learn and Segment or Apply to Selected, or refresh the list")
         return False
     return True
 

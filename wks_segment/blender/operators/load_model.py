@@ -28,6 +28,8 @@ class WKS_SEGMENT_OT_load_model(bpy.types.Operator, ImportHelper):
         except (ModelFileError, OSError) as error:
             self.report({"ERROR"}, f"{path.name} was not loaded: {error}")
             return {"CANCELLED"}
-        context.scene.wks_segment.keep_model(model, [f"From {path.name}", f"{model.n_segments_} segments"])
+        settings = context.scene.wks_segment
+        settings.keep_notes(model.part_notes_)
+        settings.keep_model(model, [f"From {path.name}", f"{model.n_segments_} segments"])
         self.report({"INFO"}, f"Loaded a model of {model.n_segments_} segments from {path.name}")
         return {"FINISHED"}

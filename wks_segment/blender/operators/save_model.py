@@ -8,7 +8,6 @@ import bpy
 from bpy.props import StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from ...core import model_file
 from .. import tasks
 from ..errors import UserError
 
@@ -33,8 +32,9 @@ class WKS_SEGMENT_OT_save_model(bpy.types.Operator, ExportHelper):
         path = Path(bpy.path.abspath(self.filepath))
         path = path if path.suffix else path.with_suffix(self.filename_ext)
         try:
-            tasks.stored_model(context.scene.wks_segment)
-            model_file.write(path, context.scene.wks_segment.model)
+            model = tasks.stored_model(context.scene.wks_segment)
+            model.part_notes_ = context.scene.wks_segment.notes()
+            model.save(path)
         except (UserError, ValueError, OSError) as error:
             self.report({"ERROR"}, f"The model was not saved: {error}")
             return {"CANCELLED"}

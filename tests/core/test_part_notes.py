@@ -1,0 +1,67 @@
+"""What a user notes on parts is kept with the model; what is damaged is refused by its name."""
+
+import json
+
+import pytest
+from shapes import creature
+
+from wks_segment.core import ModelFileError, PartNotes, PoseSegmentation
+
+NOTES = PartNotes({3: "Hand", 1002: "Fuß.L"}, {3: (1.0, 0.5, 0.25), 500: (0.0, 0.0, 1.0)}, {2: 3, 1001: 3})
+
+
+@pytest.fixture(scope="module")
+def text():
+    return PoseSegmentation(3, n_eigenpairs=20, n_energies=12).fit([creature(0.0, 3)]).to_json()
+
+
+def test_a_new_model_has_none_and_its_file_says_nothing_of_them(text):
+    assert PoseSegmentation.from_json(text).part_notes_ == PartNotes()
+    assert not {"part_names", "part_colors", "joined_parts"} & set(json.loads(text))
+
+
+def test_notes_go_to_a_file_and_come_back(text, tmp_path):
+    model = PoseSegmentation.from_json(text)
+    model.part_notes_ = NOTES
+    model.save(tmp_path / "model.json")
+    loaded = PoseSegmentation.load(tmp_path / "model.json")
+    assert loaded.part_notes_ == NOTES
+    assert json.loads((tmp_path / "model.json").read_text())["part_names"] == {"3": "Hand", "1002": "Fuß.L"}
+    assert loaded.to_json() == model.to_json()
+
+
+def test_learning_again_forgets_them(text):
+    model = PoseSegmentation.from_json(text)
+    model.part_notes_ = NOTES
+    assert model.fit([creature(0.0, 3)]).part_notes_ == PartNotes()
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("part_names", ["Hand"], "part_names has no names of its entries"),
+        ("part_names", {"-1": "Hand"}, "part_names has an entry '-1', which is no part"),
+        ("part_names", {"3000": "Hand"}, "part_names has an entry '3000', which is no part"),
+        ("part_names", {"٣": "Hand"}, "which is no part"),
+        ("part_names", {"3": "Hand", "03": "Foot"}, "which is no part or is there twice"),
+        ("part_names", {"3": ""}, "part_names has for part 3 something else than a name of up to 50 letters"),
+        ("part_names", {"3": " Hand"}, "something else than a name"),
+        ("part_names", {"3": "x" * 51}, "something else than a name"),
+        ("part_names", {"3": "a\nb"}, "something else than a name"),
+        ("part_names", {"3": 7}, "something else than a name"),
+        ("part_names", {"3": "Hand", "4": "Hand"}, "part_names has a name twice"),
+        ("part_colors", {"3": [1, 0]}, "part_colors has for part 3 something else than a color"),
+        ("part_colors", {"3": [1, 0, 1.5]}, "something else than a color"),
+        ("part_colors", {"3": [1, 0, 10**400]}, "something else than a color"),
+        ("part_colors", {"3": [1, 0, float("nan")]}, "something else than a color"),
+        ("part_colors", {"3": [True, 0, 0]}, "something else than a color"),
+        ("part_colors", {"3": "red"}, "something else than a color"),
+        ("joined_parts", {"3": "4"}, "joined_parts has for part 3 something else than a part"),
+        ("joined_parts", {"3": 3}, "joins a part with one that is joined itself"),
+        ("joined_parts", {"3": 4, "4": 5}, "joins a part with one that is joined itself"),
+        ("joined_parts", None, "joined_parts has no names"),
+    ],
+)
+def test_damaged_notes_are_refused(text, field, value, message):
+    with pytest.raises(ModelFileError, match=f"the model is damaged: .*{message}"):
+        PoseSegmentation.from_json(json.dumps({**json.loads(text), field: value}))

@@ -1,0 +1,98 @@
+"""Assign, New Segment and Forget: what the selected faces are, by hand."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from bpy.props import StringProperty
+
+from .. import segments
+from ..edits import by_hand, keep_by_hand, values
+from . import feedback
+
+
+class WKS_SEGMENT_OT_assign_faces(bpy.types.Operator):
+    """Let the selected faces be of the active segment, also when the model is applied again"""
+
+    bl_idname = "wks_segment.assign_faces"
+    bl_label = "Assign Faces to Segment"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return feedback.has_segments(cls, context, "EDIT_MESH")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        return _assign(self, context, segments.active_part(context.scene.wks_segment))
+
+
+class WKS_SEGMENT_OT_new_segment(bpy.types.Operator):
+    """Make a new segment of the selected faces"""
+
+    bl_idname = "wks_segment.new_segment"
+    bl_label = "New Segment from Faces"
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: StringProperty(
+        name="Name", description="What the segment is called", default="New Segment", options={"SKIP_SAVE"}
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return feedback.has_segments(cls, context, "EDIT_MESH")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        return _assign(self, context, None)
+
+
+class WKS_SEGMENT_OT_forget_faces(bpy.types.Operator):
+    """Give the selected faces (in Object Mode: all) the segment that the model gives them, not that by hand"""
+
+    bl_idname = "wks_segment.forget_faces"
+    bl_label = "Forget Faces Assigned by Hand"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not feedback.has_segments(cls, context):
+            return False
+        if not context.scene.wks_segment.faces_by_hand:
+            cls.poll_message_set("No face was assigned by hand")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        settings = context.scene.wks_segment
+        chosen_only = context.mode == "EDIT_MESH"
+        objects, count = segments.labelled(settings), 0
+        with segments.object_mode(context):
+            for mesh in segments.meshes_of(objects):
+                given = by_hand(mesh)
+                forgotten = (given >= 0) & (values(mesh.polygons, "select", bool) | (not chosen_only))
+                count += int(forgotten.sum())
+                keep_by_hand(mesh, np.where(forgotten, -1, given))
+            segments.rewrite_all(settings, objects)
+        self.report({"INFO"}, f"{count} faces are as the model has them")
+        return {"FINISHED"}
+
+
+def _assign(operator: bpy.types.Operator, context: bpy.types.Context, part: int | None) -> set[str]:
+    """Give the selected faces to a part; None: to a new one."""
+    settings = context.scene.wks_segment
+    # Faces of objects that are not in Edit Mode can be selected too, unseen.
+    objects = [obj for obj in segments.labelled(settings) if obj.mode == "EDIT"]
+    with segments.object_mode(context):
+        chosen = {mesh: values(mesh.polygons, "select", bool) for mesh in segments.meshes_of(objects)}
+        count = sum(int(selected.sum()) for selected in chosen.values())
+        if count:
+            if part is None:
+                part = segments.make_part(settings, operator.name)
+            for mesh, selected in chosen.items():
+                keep_by_hand(mesh, np.where(selected, part, by_hand(mesh)))
+            segments.rewrite_all(settings, objects)
+            segments.activate(settings, part)
+    if not count:
+        operator.report({"WARNING"}, "Select some faces of an object that has segments first")
+        return {"CANCELLED"}
+    operator.report({"INFO"}, f"{count} faces are of {settings.style().name_of(part)} now")
+    return {"FINISHED"}

@@ -1,0 +1,31 @@
+"""Name from a preset."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import StringProperty
+
+from .. import segments
+from . import feedback
+
+
+class WKS_SEGMENT_OT_name_segment(bpy.types.Operator):
+    """Call the active segment so, and its other side too"""
+
+    bl_idname = "wks_segment.name_segment"
+    bl_label = "Name Segment"
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: StringProperty(name="Name", description="What the segment is called. Empty: the number again")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return feedback.has_segments(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        settings = context.scene.wks_segment
+        part = segments.active_part(settings)
+        if part is not None:
+            segments.rename(settings, part, self.name)
+            self.report({"INFO"}, f"Named {settings.style().name_of(part)}")
+        return {"FINISHED"}

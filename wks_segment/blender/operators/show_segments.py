@@ -1,0 +1,92 @@
+"""Hide or Show, Isolate and Show All: Blender's own hiding of faces, segment by segment."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from bpy.props import IntProperty
+
+from ...core.mesh import BoolArray, IntArray
+from .. import segments
+from ..edits import values
+from ..labels import labels_on
+from . import feedback
+
+
+class _Shows:
+    """What the three share: they say for each face whether it is hidden."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return feedback.has_segments(cls, context)
+
+    def hidden(self, labels: IntArray, before: BoolArray, settings: bpy.types.PropertyGroup) -> BoolArray:
+        """(p,) whether faces of these parts are hidden, given whether they were."""
+        raise NotImplementedError
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        settings = context.scene.wks_segment
+        meshes, count = segments.meshes_of(segments.labelled(settings)), 0
+        with segments.object_mode(context):
+            for mesh in meshes:
+                labels = labels_on(mesh)
+                if labels is not None:
+                    hidden = self.hidden(labels, values(mesh.polygons, "hide", bool), settings)
+                    _hide(mesh, hidden)
+                    count += int(hidden.sum())
+            segments.fill(settings)
+        where = " in Edit Mode, Sculpt Mode and while painting" if count and context.mode == "OBJECT" else ""
+        self.report({"INFO"}, f"{count or 'No'} faces are hidden{where}")  # type: ignore[attr-defined]  # an operator's
+        return {"FINISHED"}
+
+
+class WKS_SEGMENT_OT_hide_segment(_Shows, bpy.types.Operator):
+    """Hide the faces of a segment in Edit Mode, Sculpt Mode and while painting, or show them again"""
+
+    bl_idname = "wks_segment.hide_segment"
+    bl_label = "Hide or Show Segment"
+
+    part: IntProperty(
+        name="Segment", description="Number of the segment; -1: the active one", default=-1, min=-1,
+        options={"SKIP_SAVE"},
+    )  # fmt: skip
+
+    def hidden(self, labels: IntArray, before: BoolArray, settings: bpy.types.PropertyGroup) -> BoolArray:
+        part = self.part if self.part >= 0 else segments.active_part(settings)
+        shown = any(item.number == part and not item.hidden for item in settings.segments)
+        return np.where(labels == part, shown, before)
+
+
+class WKS_SEGMENT_OT_isolate_segment(_Shows, bpy.types.Operator):
+    """Hide all faces but those of the active segment"""
+
+    bl_idname = "wks_segment.isolate_segment"
+    bl_label = "Isolate Segment"
+
+    def hidden(self, labels: IntArray, before: BoolArray, settings: bpy.types.PropertyGroup) -> BoolArray:
+        return np.asarray(labels != segments.active_part(settings))
+
+
+class WKS_SEGMENT_OT_show_segments(_Shows, bpy.types.Operator):
+    """Show the faces of all segments"""
+
+    bl_idname = "wks_segment.show_segments"
+    bl_label = "Show All Segments"
+
+    def hidden(self, labels: IntArray, before: BoolArray, settings: bpy.types.PropertyGroup) -> BoolArray:
+        return np.zeros_like(before)
+
+
+def _hide(mesh: bpy.types.Mesh, hidden: BoolArray) -> None:
+    """Hide these faces, and the vertices and edges that are of hidden faces only."""
+    corners = np.repeat(hidden, values(mesh.polygons, "loop_total", np.int32))
+    for elements, of_corner in ((mesh.vertices, "vertex_index"), (mesh.edges, "edge_index")):
+        of = values(mesh.loops, of_corner, np.int32)
+        gone = values(elements, "hide", bool)
+        gone[of] = True
+        gone[of[~corners]] = False
+        elements.foreach_set("hide", gone)
+    mesh.polygons.foreach_set("hide", hidden)
+    mesh.update()
