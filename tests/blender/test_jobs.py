@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from builders import changes, labels_of, limbed, limbed_poses, mesh_object, scene_snapshot, select, snapshot
 
-from wks_segment.blender import jobs, operators, panel
+from wks_segment.blender import jobs, operators, panel, session
 from wks_segment.blender.errors import ChangedError, TooLargeError, UserError
 from wks_segment.blender.jobs import BUSY, Job, TimeLeft, desk_of
 from wks_segment.blender.operators import feedback
@@ -436,7 +436,8 @@ class Window:
 
     def __init__(self):
         self.window = object()
-        self.window_manager = MagicMock(wks_segment_desk=desk_of(bpy.context), windows=[])
+        held = {holder: getattr(bpy.context.window_manager, holder) for holder in (jobs.HOLDER, session.HOLDER)}
+        self.window_manager = MagicMock(**held, windows=[])
         self.window_manager.event_timer_add.return_value = None
         self.window_manager.invoke_confirm.return_value = {"RUNNING_MODAL"}
 
