@@ -16,8 +16,8 @@ from mathutils import Matrix, Vector
 
 from ..core.mesh import FloatArray, IntArray
 from .errors import UserError
-from .palette import colors_of
 from .poses import Pose
+from .style import PLAIN, Style
 
 TILE = 480
 """Width and height of a pose in the picture, in pixels."""
@@ -44,7 +44,7 @@ class Tile:
     caption: str
 
 
-def render_poses(tiles: Sequence[Tile], path: Path, columns: int = COLUMNS) -> None:
+def render_poses(tiles: Sequence[Tile], path: Path, columns: int = COLUMNS, style: Style = PLAIN) -> None:
     """Render poses into one PNG file, `columns` in a row.
 
     Uses a scene of its own, which is gone afterwards.
@@ -66,7 +66,7 @@ def render_poses(tiles: Sequence[Tile], path: Path, columns: int = COLUMNS) -> N
         for i, (tile, points) in enumerate(zip(tiles, placed, strict=True)):
             middle = (points.min(axis=0) + points.max(axis=0)) / 2
             place = np.array([i % columns, -(i // columns), 0.0]) * side
-            _add_pose(scene, (points - middle + place) / side, tile)
+            _add_pose(scene, (points - middle + place) / side, tile, style)
             _add_caption(scene, tile.caption, place / side)
         _add_camera(scene, columns, rows)
         _render(scene, path, columns, rows)
@@ -89,19 +89,19 @@ def _scene() -> Iterator[bpy.types.Scene]:
         bpy.data.scenes.remove(scene)
 
 
-def _add_pose(scene: bpy.types.Scene, points: FloatArray, tile: Tile) -> None:
+def _add_pose(scene: bpy.types.Scene, points: FloatArray, tile: Tile, style: Style) -> None:
     """The triangles of a pose in the camera's own axes: x to the right, y up, z towards it."""
     mesh = bpy.data.meshes.new("pose")
     mesh.from_pydata(points.tolist(), [], tile.pose.mesh.faces.tolist())
     mesh.shade_smooth()
-    _paint(mesh, np.repeat(_triangle_colors(tile), 3, axis=0))
+    _paint(mesh, np.repeat(_triangle_colors(tile, style), 3, axis=0))
     scene.collection.objects.link(bpy.data.objects.new("pose", mesh))
 
 
-def _triangle_colors(tile: Tile) -> FloatArray:
+def _triangle_colors(tile: Tile, style: Style) -> FloatArray:
     """(m, 3) color of each triangle; grey where it is of no polygon of the character's own."""
     polygon_of = tile.pose.polygon_of
-    return np.where(polygon_of[:, None] < 0, 0.6, colors_of(tile.labels[polygon_of]))
+    return np.where(polygon_of[:, None] < 0, 0.6, style.colors_of(tile.labels[polygon_of]))
 
 
 def _add_caption(scene: bpy.types.Scene, text: str, place: FloatArray) -> None:

@@ -21,10 +21,13 @@ class Style:
         By the part's number; others are called as `parts.name_of` calls them.
     colors
         (3,) sRGB, 0 to 1, by the part's number; others have that of the palette.
+    palette
+        Name of the palette, one of `palette.RECIPES`.
     """
 
     names: Mapping[int, str] = field(default_factory=dict)
     colors: Mapping[int, FloatArray] = field(default_factory=dict)
+    palette: str = palette.DEFAULT
 
     def name_of(self, part: int) -> str:
         """As a person reads it."""
@@ -32,7 +35,7 @@ class Style:
 
     def colors_of(self, numbers: IntArray) -> FloatArray:
         """(…, 3) sRGB colour of each part, given (…) numbers."""
-        colors = palette.colors_of(numbers).copy()
+        colors = palette.colors_of(numbers, self.palette).copy()
         for part, color in self.colors.items():
             colors[np.asarray(numbers) == part] = color
         return colors

@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+import bpy
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -26,6 +27,7 @@ from .labels import write_labels
 from .poses import Pose
 from .report import Report
 from .settings import WKSSegmentSettings
+from .style import Style
 from .weights import by_parts, hard_weights, soft_weights
 
 VOTERS = 5
@@ -42,8 +44,11 @@ class Wanted:
         Smallest connected part, as a share of the area.
     sides : "one" or "two"
     vertex_groups : "none", "hard" or "soft"
-    colors, materials : bool
+    colors, materials, face_sets, seams : bool
         Whether they are written.
+    template : str
+        Name of the material that those of parts are copies of; empty: none.
+    style : Style
     bodies
         Of the characters that are labelled.
     """
@@ -53,6 +58,10 @@ class Wanted:
     vertex_groups: str
     colors: bool
     materials: bool
+    face_sets: bool
+    seams: bool
+    template: str
+    style: Style
     bodies: dict[Character, Body]
 
     @classmethod
@@ -64,6 +73,10 @@ class Wanted:
             settings.vertex_groups,
             settings.write_colors,
             settings.write_materials,
+            settings.write_face_sets,
+            settings.write_seams,
+            settings.material_template.name if settings.material_template is not None else "",
+            settings.style(),
             {character: Body.of(character, settings.snap_to) for character in dict.fromkeys(characters)},
         )
 
@@ -181,10 +194,8 @@ def label(
                 found = parts.numbered(found, sides)
             found = filled(found, body)
             labels |= {poses[i].character: found for i in mine}
-    occurring = parts.among(np.concatenate(list(labels.values())))
-    report.n_segments = len(np.unique(parts.segments_of(np.array(occurring))))
-    report.parts = {parts.name_of(part): part for part in occurring}
-    if wanted.sides == "two" and len(occurring) == report.n_segments:
+    report.tell_of_parts(np.concatenate(list(labels.values())))
+    if wanted.sides == "two" and len(report.parts) == report.n_segments:
         report.warn(
             "Left and right are not told apart with the method of the paper: parts are one for both sides"
             if model.regions_ is None
@@ -243,6 +254,9 @@ def write(
     soft: dict[Character, dict[int, FloatArray]] | None = None,
 ) -> None:  # fmt: skip
     """Write labels, and the weights that `soften` gave, to the objects of each character."""
+    if soft is None and wanted.vertex_groups == "soft":
+        report.warn("The vertex groups are hard: only a model says how probable a segment is (Apply to Selected)")
+    template = bpy.data.materials.get(wanted.template)
     with report.stage("write"):
         for character, values in labels.items():
             ranges = zip(reader.polygon_ranges(character), reader.vertex_ranges(character), strict=True)
@@ -250,9 +264,12 @@ def write(
                 if polygons.stop == polygons.start:
                     continue
                 weights = None if soft is None else {part: of[vertices] for part, of in soft[character].items()}
-                if wanted.vertex_groups == "hard":
+                if weights is None and wanted.vertex_groups != "none":
                     weights = hard_weights(obj.data, values[polygons])
-                write_labels(obj.data, values[polygons], wanted.colors, wanted.materials, weights)
+                write_labels(
+                    obj.data, values[polygons], wanted.colors, wanted.materials, weights, wanted.style,
+                    wanted.face_sets, wanted.seams, template,
+                )  # fmt: skip
 
 
 def stored_model(settings: WKSSegmentSettings) -> PoseSegmentation:
