@@ -559,3 +559,16 @@ def test_borders_of_labels():
     assert found == {(0, 2)}
     assert not borders(mesh, np.array([1, 1])).any()
     assert labels_on(mesh) is None
+
+
+def test_pieces_are_removed_though_the_whole_is_out_of_sight(labelled):
+    """In a collection that is excluded from the view layer, where nothing can be shown or selected."""
+    collection = bpy.data.collections.new("Kept")
+    bpy.context.scene.collection.children.link(collection)
+    OPS.separate()
+    collection.objects.link(labelled)
+    bpy.context.scene.collection.objects.unlink(labelled)
+    bpy.context.view_layer.layer_collection.children["Kept"].exclude = True
+    assert OPS.clear() == {"FINISHED"}
+    assert [obj.name for obj in bpy.data.objects] == ["Limbed"]
+    assert not labelled.hide_render

@@ -75,9 +75,10 @@ def unite(context: bpy.types.Context, whole: bpy.types.Object) -> int:
             bpy.data.meshes.remove(mesh)
     before = whole[WHOLE].to_dict()
     del whole[WHOLE]
-    whole.hide_set(before["eye"])
     whole.hide_render = before["render"]
-    if not before["eye"]:
+    if whole.name in context.view_layer.objects:
+        whole.hide_set(before["eye"])
+    if whole.visible_get(view_layer=context.view_layer):
         whole.select_set(True)
         context.view_layer.objects.active = whole
     return kept
