@@ -164,8 +164,12 @@ def labels_of(obj):
 
 
 PROPERTIES = {
+    "INT16_2D": ("value", 2),
     "FLOAT_VECTOR": ("vector", 3), "FLOAT2": ("vector", 2), "BYTE_COLOR": ("color", 4), "FLOAT_COLOR": ("color", 4),
 }  # fmt: skip
+
+
+READABLE = {".sculpt_face_set", ".uv_seam", ".hide_poly"}
 
 
 def snapshot(mesh):
@@ -173,7 +177,8 @@ def snapshot(mesh):
     attributes = {}
     for attribute in mesh.attributes:
         values = b""
-        if not attribute.name.startswith("."):  # of its own ones Blender 5.0 gives some a wrong type
+        # Of its own ones Blender 5.0 gives some a wrong type.
+        if not attribute.name.startswith(".") or attribute.name in READABLE:
             prop, width = PROPERTIES.get(attribute.data_type, ("value", 1))
             values = numbers(mesh, attribute.name, prop, width).tobytes()  # in which NaN equals NaN
         attributes[attribute.name] = (attribute.domain, attribute.data_type, values)
@@ -189,6 +194,8 @@ def snapshot(mesh):
         "default color": mesh.attributes.default_color_name,
         "render color": mesh.color_attributes.render_color_index,
         "active uv": mesh.uv_layers.active_index,
+        "render uv": [layer.active_render for layer in mesh.uv_layers],
+        "selection": [select_flags(of).tobytes() for of in (mesh.vertices, mesh.edges, mesh.polygons)],
         "slots": [material.name if material else None for material in mesh.materials],
         "material index": material_index.tolist(),
         "properties": {key: getattr(value, "to_dict", lambda value=value: value)() for key, value in mesh.items()},
@@ -197,18 +204,73 @@ def snapshot(mesh):
     }
 
 
+def select_flags(collection):
+    """Which elements are selected and which are hidden."""
+    flags = np.empty((2, len(collection)), dtype=bool)
+    collection.foreach_get("select", flags[0])
+    collection.foreach_get("hide", flags[1])
+    return flags
+
+
+def groups_snapshot(obj):
+    """Vertex groups of an object, and which vertex is in which."""
+    groups = [(group.name, group.lock_weight) for group in obj.vertex_groups]
+    members = [(g.group, g.weight) for vertex in obj.data.vertices for g in vertex.groups]
+    return groups, obj.vertex_groups.active_index, hash(tuple(members))
+
+
+def object_snapshot(obj):
+    """What an artist could miss of an object."""
+    mesh = obj.type == "MESH"
+    return {
+        "selected": obj.select_get(),
+        "hidden": (obj.hide_get(), obj.hide_viewport, obj.hide_render),
+        "data": obj.data.name if obj.data else None,
+        "parent": (obj.parent and obj.parent.name, obj.parent_type, obj.parent_bone),
+        "place": [tuple(row) for m in (obj.matrix_world, obj.matrix_parent_inverse) for row in m],
+        "collections": sorted(collection.name for collection in obj.users_collection),
+        "modifiers": [(modifier.name, modifier.type) for modifier in obj.modifiers],
+        "slots": [(slot.link, slot.material and slot.material.name) for slot in obj.material_slots],
+        "keys": (obj.active_shape_key_index, obj.show_only_shape_key),
+        "groups": groups_snapshot(obj) if mesh else None,
+        "properties": sorted(obj.keys()),
+        "pose": pose_snapshot(obj) if obj.type == "ARMATURE" else None,
+    }
+
+
+def pose_snapshot(armature):
+    """How an armature is posed, and by what."""
+    data = armature.animation_data
+    moved_by = data and (data.action and data.action.name, getattr(data, "action_slot", None), data.use_nla)
+    bones = {
+        bone.name: (
+            bone.rotation_mode, *bone.location, *bone.rotation_quaternion, *bone.rotation_euler, *bone.scale,
+            *bone.rotation_axis_angle,
+        )
+        for bone in armature.pose.bones
+    }  # fmt: skip
+    return {"moved by": str(moved_by), "bones": bones, "position": armature.data.pose_position}
+
+
+def image_snapshot(image):
+    """What is in an image, and what its numbers mean."""
+    values = np.empty(image.channels * image.size[0] * image.size[1], dtype=np.float32)
+    image.pixels.foreach_get(values)
+    return (tuple(image.size), image.colorspace_settings.name, values.tobytes())
+
+
 def scene_snapshot():
-    """All meshes, materials and objects of the file, and what the scene shows."""
-    context = bpy.context
+    """All meshes, materials, images and objects of the file, and what the scene shows."""
+    context, tools = bpy.context, bpy.context.scene.tool_settings
     return {
         "meshes": {mesh.name: snapshot(mesh) for mesh in bpy.data.meshes},
-        "objects": {
-            obj.name: (obj.select_get(), obj.active_shape_key_index, obj.show_only_shape_key)
-            for obj in bpy.data.objects
-        },
+        "objects": {obj.name: object_snapshot(obj) for obj in bpy.data.objects},
+        "images": {image.name: image_snapshot(image) for image in bpy.data.images},
+        "engine": context.scene.render.engine,
+        "tools": (tools.use_uv_select_sync, tuple(tools.mesh_select_mode)),
         "materials": sorted(material.name for material in bpy.data.materials),
         "scenes": [scene.name for scene in bpy.data.scenes],
-        "active": context.view_layer.objects.active,
+        "active": context.view_layer.objects.active and context.view_layer.objects.active.name,
         "frame": (context.scene.frame_current, context.scene.frame_subframe),
         "model": (context.scene.wks_segment.model, context.scene.wks_segment.model_summary),
         "notes": context.scene.wks_segment.part_notes,

@@ -76,3 +76,60 @@ def test_oklab_of_known_colours():
     primaries = np.array([[1.0, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]])
     known = [[1, 0, 0], [0.628, 0.225, 0.126], [0.866, -0.234, 0.179], [0.452, -0.032, -0.312], [0, 0, 0]]
     np.testing.assert_allclose(oklab(primaries), known, atol=1e-3)
+
+
+# Palettes to choose from
+
+BLINDNESS = {
+    "without red": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+    "without green": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
+    "without blue": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
+}
+"""Machado, Oliveira and Fernandes (2009), severity 1: what who lacks a kind of cones sees, in linear light."""
+
+
+def as_seen(srgb, eyes):
+    """sRGB colours as somebody sees them."""
+    light = np.clip(module.linear(srgb) @ np.array(eyes).T, 0, 1)
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+
+
+def closest(srgb):
+    lab = oklab(srgb.reshape(-1, 3))
+    distance = np.linalg.norm(lab[:, None] - lab[None], axis=2)
+    return distance[np.triu_indices(len(lab), 1)].min()
+
+
+@pytest.mark.parametrize(("count", "least"), [(4, 0.3), (8, 0.14), (12, 0.11), (16, 0.1), (MAX_COLOURS, 0.04)])
+@pytest.mark.parametrize("eyes", [np.eye(3), *BLINDNESS.values()], ids=["all cones", *BLINDNESS])
+def test_color_blind_safe_colors_are_told_apart_without_a_kind_of_cones(eyes, count, least):
+    assert closest(as_seen(palette("color_blind")[:count], eyes)) > least
+
+
+@pytest.mark.parametrize("eyes", [np.eye(3), *BLINDNESS.values()], ids=["all cones", *BLINDNESS])
+def test_color_blind_safe_colors_of_sides_are_told_apart(eyes):
+    colors = as_seen(sided_palette("color_blind")[:, :8], eyes)
+    assert closest(colors) > 0.045
+    assert np.linalg.norm(oklab(colors[1]) - oklab(colors[2]), axis=1).min() > 0.13
+
+
+def test_the_calm_palette_is_not_color_blind_safe():
+    """Else there would be no need of another."""
+    assert min(closest(as_seen(palette()[:8], eyes)) for eyes in BLINDNESS.values()) < 0.06
+
+
+@pytest.mark.parametrize(("count", "least"), [(8, 0.27), (16, 0.17), (MAX_COLOURS, 0.09)])
+def test_maximally_different_colors_are_farther_apart_than_the_calm_ones(count, least):
+    assert closest(palette("maximal")[:count]) > max(least, 1.2 * closest(palette()[:count]))
+
+
+@pytest.mark.parametrize("name", module.RECIPES)
+def test_every_palette_is_srgb_and_has_nothing_black_and_a_left_lighter_than_the_right(name):
+    colors = sided_palette(name)
+    assert colors.shape == (3, MAX_COLOURS, 3)
+    assert ((colors >= 0) & (colors <= 1)).all()
+    middle, left, right = oklab(colors)
+    assert middle[:, 0].min() > 0.24
+    assert left[:, 0].min() > right[:, 0].max() + 0.04
+    in_bytes = np.rint(255 * colors).reshape(-1, 3)
+    assert len(np.unique(in_bytes, axis=0)) == 3 * MAX_COLOURS

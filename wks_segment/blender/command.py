@@ -10,15 +10,20 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 
 from ..core import PartNotes, PoseSegmentation
 from ..core.description import Progress
 from . import demo, files, parts, tasks
 from . import poses as reader
+from .bake import bake_id_maps
 from .characters import Character, armature_of, group, mesh_objects
 from .edits import merged
 from .errors import UserError
+from .id_map import save
+from .labels import labels_on
 from .picture import Tile, render_poses
+from .pose_library import read_actions
 from .poses import Pose
 from .report import Report, pose_warnings, segment_warnings
 from .settings import WKSSegmentSettings
@@ -41,8 +46,18 @@ OPTIONS = {
     "--preset": "preset",
 }
 """Options that are settings: their text, limits and defaults come from the property group."""
-OUTPUT_OPTIONS = {"--vertex-groups": "vertex_groups", "--snap-to": "snap_to", "--sides": "sides"}
+OUTPUT_OPTIONS = {
+    "--vertex-groups": "vertex_groups", "--snap-to": "snap_to", "--sides": "sides", "--palette": "palette",
+}  # fmt: skip
 """The same for commands that write labels."""
+OUTPUT_FLAGS = {
+    "--materials": ("write_materials", "also write a material for each segment"),
+    "--face-sets": ("write_face_sets", "also write a face set for each segment"),
+    "--seams": ("write_seams", "also mark the borders of segments as seams"),
+}
+"""The same that are on or off, and what they do."""
+BAKE_OPTIONS = {"--size": "bake_size", "--margin": "bake_margin", "--palette": "palette", "--sides": "sides"}
+"""Settings of `bake`."""
 AUTOMATIC = {"n_segments": "auto_segments"}
 """Numbers that can be left open by the word "auto", and the settings that do it."""
 
@@ -80,7 +95,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_poses(learn)
     _add_settings(learn)
     learn.add_argument("--model", type=Path, required=True, help="write the model to this file")
-    learn.set_defaults(run=_segment, output=None, render=None, materials=False)
+    learn.set_defaults(run=_segment, output=None, render=None)
 
     apply = commands.add_parser("apply", help="find the parts of a model in files")
     _add_poses(apply)
@@ -89,6 +104,25 @@ def _parser() -> argparse.ArgumentParser:
         _add_setting(apply, option, OPTIONS[option])
     _add_outputs(apply)
     apply.set_defaults(run=_apply)
+
+    bake = commands.add_parser("bake", help="bake the parts in a file, or those that a model finds, to an ID map")
+    bake.add_argument("files", type=Path, nargs=1, metavar="FILE", help=", ".join(files.IMPORTERS))
+    bake.add_argument(
+        "--output", type=Path, required=True, metavar="PNG",
+        help="write the image to this file; of several images, each to one with the name of its object",
+    )  # fmt: skip
+    bake.add_argument("--model", type=Path, help="find the parts by this model, whatever the file has")
+    bake.add_argument(
+        "--object", action="append", metavar="NAME", help="use this object only; may be given several times"
+    )
+    bake.add_argument(
+        "--unwrap", action="store_true", help="Smart UV Project for objects without a UV map; see --blend"
+    )
+    bake.add_argument("--blend", type=Path, help="write the scene to this file as well, with UV maps and images")
+    for option in ("--smoothness", "--smallest-part", "--limit-minutes", "--limit-memory"):
+        _add_setting(bake, option, OPTIONS[option])
+    _add_settings(bake, BAKE_OPTIONS)
+    bake.set_defaults(run=_bake, action=None, frames=None, shape_keys=None, markers=None, actions=None)
 
     show = commands.add_parser("demo", help="build a creature, learn from some poses, and check on others")
     show.add_argument("--input", type=Path, help="an animated file in the place of the creature")
@@ -99,7 +133,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_settings(show, OPTIONS | OUTPUT_OPTIONS)
     show.set_defaults(run=_demo)
 
-    for command in (segment, learn, apply, show):
+    for command in (segment, learn, apply, bake, show):
         command.add_argument("--json", action="store_true", help="print one JSON object")
     return parser
 
@@ -112,6 +146,13 @@ def _add_poses(parser: argparse.ArgumentParser) -> None:
         help="take poses from frames of each file's animation; COUNT: of all of it; --frames=-5:20:3 with a minus",
     )  # fmt: skip
     where.add_argument("--shape-keys", type=_within(int, 1, 1000), metavar="COUNT", help="take poses from shape keys")
+    where.add_argument(
+        "--markers", type=_within(int, 1, 1000), metavar="COUNT", help="take poses from the timeline's markers"
+    )
+    where.add_argument(
+        "--actions", type=_within(int, 1, 1000), metavar="COUNT",
+        help="take poses from the pose assets of each file, or else from the middles of its actions",
+    )  # fmt: skip
     parser.add_argument("--action", help="name of the action to take the frames from")
     parser.add_argument(
         "--object", action="append", metavar="NAME", help="use this object only; may be given several times"
@@ -121,7 +162,8 @@ def _add_poses(parser: argparse.ArgumentParser) -> None:
 def _add_outputs(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--output", type=Path, help=f"write the scene to this file ({', '.join(files.EXPORTERS)})")
     parser.add_argument("--render", type=Path, metavar="PNG", help="write a picture of all poses side by side")
-    parser.add_argument("--materials", action="store_true", help="also write a material for each segment")
+    for option, (name, text) in OUTPUT_FLAGS.items():
+        parser.add_argument(option, action="store_true", dest=name, help=text)
     _add_settings(parser, OUTPUT_OPTIONS)
 
 
@@ -238,6 +280,49 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     return _result(options, report)
 
 
+def _bake(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
+    _check_picture(options.output)
+    if options.blend:
+        files.check_output(options.blend)
+    report = Report([])
+    poses = _read(options, report)
+    settings = _settings(options)
+    characters = list(dict.fromkeys(pose.character for pose in poses))
+    there = [labels_on(obj.data) for of in characters for obj in of.objects if len(obj.data.polygons)]
+    if options.model or any(of_object is None for of_object in there):
+        if not (options.model or settings.model):
+            raise UserError(f"{options.files[0]}: there are no segments in it: give the --model that finds them")
+        model = _load(options.model) if options.model else tasks.stored_model(settings)
+        if options.smoothness is not None:
+            model.smoothness = settings.smoothness
+        tasks.check_limits(model, poses, settings)
+        described = tasks.describe(model, poses, report, progress)
+        wanted = Wanted.of(settings, characters)
+        labels = tasks.label(model, poses, described, wanted, report, progress)
+        tasks.write(settings, labels, wanted, report)
+    else:
+        report.laplacians = ["none"] * len(poses)
+        report.tell_of_parts(np.concatenate([of_object for of_object in there if of_object is not None]))
+    written: dict[str, Path] = {}
+    with report.stage("bake"):
+        id_maps = [
+            id_map
+            for character in characters
+            for id_map in bake_id_maps(
+                bpy.context, character, settings.style(), settings.bake_size, settings.bake_margin, options.unwrap,
+                report.warnings, progress,
+            )
+        ]  # fmt: skip
+        for id_map in id_maps:
+            of = "" if len(id_maps) == 1 else f"_{bpy.path.clean_name(id_map.objects[0].name)}"
+            written[id_map.image.name] = options.output.with_stem(options.output.stem + of)
+            save(id_map.image, written[id_map.image.name])
+    if options.blend:
+        files.save_scene(options.blend)
+        written["blend"] = options.blend
+    return _result(options, report) | {"files": {name: str(path) for name, path in written.items()}}
+
+
 def _demo(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     if options.input:
         characters = _characters(options.input, files.open_files([options.input])[0], None)
@@ -257,9 +342,13 @@ def _check_outputs(options: argparse.Namespace) -> None:
     if options.output:
         files.check_output(options.output)
     if options.render:
-        if options.render.suffix.lower() != ".png":
-            raise UserError(f"{options.render}: a picture is written as .png")
-        files.check_folder(options.render)
+        _check_picture(options.render)
+
+
+def _check_picture(path: Path) -> None:
+    if path.suffix.lower() != ".png":
+        raise UserError(f"{path}: a picture is written as .png")
+    files.check_folder(path)
 
 
 def _read(options: argparse.Namespace, report: Report) -> list[Pose]:
@@ -272,6 +361,10 @@ def _read(options: argparse.Namespace, report: Report) -> list[Pose]:
             for character in characters:
                 if options.shape_keys is not None:
                     poses += reader.read_shape_keys(bpy.context, character, options.shape_keys)
+                elif options.markers is not None:
+                    poses += reader.read_markers(bpy.context, character, options.markers)
+                elif options.actions is not None:
+                    poses += read_actions(bpy.context, character, options.actions)
                 elif options.frames is not None:
                     first, last, count = options.frames
                     if first is None or last is None:
@@ -325,7 +418,7 @@ def _settings(options: argparse.Namespace) -> WKSSegmentSettings:
     """Default settings, whatever the file holds, with what the command line says."""
     settings: WKSSegmentSettings = bpy.context.scene.wks_segment
     settings.property_unset("write_colors")
-    for name in (OPTIONS | OUTPUT_OPTIONS).values():
+    for name in (OPTIONS | OUTPUT_OPTIONS | BAKE_OPTIONS).values():
         settings.property_unset(name)
         value = getattr(options, name, None)
         automatic = name in AUTOMATIC and value == "auto"
@@ -333,7 +426,8 @@ def _settings(options: argparse.Namespace) -> WKSSegmentSettings:
             setattr(settings, AUTOMATIC[name], automatic)
         if value is not None and not automatic:
             setattr(settings, name, value)
-    settings.write_materials = getattr(options, "materials", False)
+    for name, _ in OUTPUT_FLAGS.values():
+        setattr(settings, name, getattr(options, name, False))
     return settings
 
 
@@ -377,7 +471,7 @@ def _load(path: Path) -> PoseSegmentation:
 
 
 def _result(options: argparse.Namespace, report: Report) -> dict[str, Any]:
-    outputs = {"model": options.model, "output": options.output, "render": options.render}
+    outputs = {name: getattr(options, name, None) for name in ("model", "output", "render")}
     return {
         "poses": [
             {

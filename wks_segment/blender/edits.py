@@ -17,7 +17,9 @@ from scipy.spatial import cKDTree
 
 from ..core.mesh import FloatArray, IntArray
 from . import parts
-from .labels import COMPONENT, NOTE, labels_on, note_of, read_ints, write_ints, write_labels
+from .labels import labels_on, write_labels
+from .materials import COMPONENT, template_of
+from .notes import NOTE, add_attribute, note_of, read_ints
 from .style import Style
 from .vertex_groups import read_groups
 from .weights import hard_weights
@@ -56,6 +58,7 @@ def merged(labels: IntArray, joined: Mapping[int, int]) -> IntArray:
 def write_edited(
     mesh: bpy.types.Mesh, labels: IntArray, style: Style, joined: Mapping[int, int], colors: bool, materials: bool,
     weights: Mapping[int, FloatArray] | None = None, hard: bool = False,
+    face_sets: bool = False, seams: bool = False, template: bpy.types.Material | None = None,
 ) -> IntArray:  # fmt: skip
     """Write (p,) parts that a model gives, with a person's edits, to a mesh; gives the parts as they were written.
 
@@ -72,7 +75,7 @@ def write_edited(
         weights = hard_weights(mesh, final)
     elif weights is not None:
         weights = moved(mesh, weights, labels, final)
-    write_labels(mesh, final, colors, materials, weights, style)
+    write_labels(mesh, final, colors, materials, weights, style, face_sets, seams, template)
     _keep(mesh, "model_labels", MODEL_LABELS, None if np.array_equal(final, labels) else labels)
     return final
 
@@ -90,7 +93,10 @@ def rewrite(mesh: bpy.types.Mesh, style: Style, joined: Mapping[int, int]) -> No
         # Weights are of the parts before; what the model gives stands for them.
         weights = moved(mesh, weights, before, labels)
     with _materials_kept(mesh):
-        write_edited(mesh, labels, style, joined, "colors" in note, "first_slot" in note, weights, hard)
+        write_edited(
+            mesh, labels, style, joined, "colors" in note, "first_slot" in note, weights, hard,
+            "face_sets" in note, "seams" in note, template_of(mesh),
+        )  # fmt: skip
 
 
 def moved(
@@ -121,7 +127,7 @@ def _keep(mesh: bpy.types.Mesh, key: str, name: str, values: IntArray | None) ->
             mesh.attributes.remove(attribute)
         mesh[NOTE].pop(key, None)
     elif attribute is None:
-        write_ints(mesh, key, name, "FACE", values)
+        add_attribute(mesh, key, name, "INT", "FACE", values.astype(np.int32))
     else:
         attribute.data.foreach_set("value", values.astype(np.int32))
 

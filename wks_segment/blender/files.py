@@ -34,6 +34,11 @@ IMPORTERS: dict[str, Callable[[str], object]] = {
     ".ply": lambda path: bpy.ops.wm.ply_import(filepath=path),
     ".stl": lambda path: bpy.ops.wm.stl_import(filepath=path),
     ".fbx": _import_fbx,
+    ".abc": lambda path: bpy.ops.wm.alembic_import(filepath=path, as_background_job=False),
+    ".usd": lambda path: bpy.ops.wm.usd_import(filepath=path),
+    ".usdc": lambda path: bpy.ops.wm.usd_import(filepath=path),
+    ".usda": lambda path: bpy.ops.wm.usd_import(filepath=path),
+    ".usdz": lambda path: bpy.ops.wm.usd_import(filepath=path),
 }
 EXPORTERS: dict[str, Callable[[str], object]] = {
     ".blend": lambda path: bpy.ops.wm.save_as_mainfile(filepath=path, copy=True),

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from ..core.mesh import BoolArray, IntArray
 from .characters import Character
-from .labels import own_material_index
+from .materials import own_material_index
 from .poses import polygon_ranges
+from .seams import own_seams
 
-EDGE_FLAGS = {"sharp": "use_edge_sharp", "seams": "use_seam"}
-"""Properties of an edge by which it is marked."""
-MATERIALS = "materials"
+SHARP, MATERIALS = "sharp", "materials"
 MOST_AROUND = 8
 """Polygons at one edge that are all neighbours of each other, less one; of more, those that follow each other are."""
 
@@ -46,7 +45,8 @@ def _pairs_of_mesh(mesh: bpy.types.Mesh, kinds: Collection[str]) -> IntArray:
             chosen |= np.diff(own_material_index(mesh)[pairs], axis=1).ravel() != 0
         else:
             marked = np.zeros(count, dtype=bool)
-            marked[edge[_read(mesh.edges, EDGE_FLAGS[kind], bool)]] = True
+            own = _read(mesh.edges, "use_edge_sharp", bool) if kind == SHARP else own_seams(mesh)
+            marked[edge[own]] = True
             chosen |= marked[between]
     return pairs[chosen]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 from math import radians
 
@@ -42,48 +43,97 @@ _TO_LAB = np.array(
         [0.0259040371, 0.7827717662, -0.8086757660],
     ]
 )
+# Machado, Oliveira and Fernandes, "A physiologically-based model for simulation of color vision deficiency" (2009):
+# linear sRGB as it is seen without the cones for red, green and blue.
+BLINDNESS = np.array(
+    [
+        [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+        [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
+        [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
+    ]
+)
+_BY_ALL = np.concatenate([np.eye(3)[None], BLINDNESS])
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What the colours of a palette are chosen from, and by whom they are to be told apart."""
+
+    title: str
+    description: str
+    lightness: tuple[float, float]
+    chroma: tuple[float, float]
+    left: tuple[float, float] = LEFT
+    right: tuple[float, float] = RIGHT
+    sided_hue: float = SIDED_HUE
+    color_blind: bool = False
+
+    def seen(self, srgb: FloatArray) -> FloatArray:
+        """(k, …, 3) sRGB colours in OKLab, as each of those sees them who are to tell them apart."""
+        return np.stack([_lab_of_linear(linear(srgb) @ eye.T) for eye in _BY_ALL[: 4 if self.color_blind else 1]])
+
+
+DEFAULT = "calm"
+RECIPES = {
+    DEFAULT: Recipe(
+        "Calm", "Clearly different and easy on the eye: shading stays readable on all of them", LIGHTNESS, CHROMA
+    ),
+    "maximal": Recipe(
+        "Maximally Different", "As far from each other as a screen can show, from dark to bright, neon among them",
+        (0.30, 0.97), (0.06, 0.40),
+    ),
+    "color_blind": Recipe(
+        "Color-Blind Safe", "Told apart without the cones for red, for green or for blue as well, by lightness too",
+        (0.25, 0.97), (0.04, 0.40), (0.66, 0.97), (0.25, 0.60), radians(90), color_blind=True,
+    ),
+}  # fmt: skip
 
 
 @cache
-def palette() -> FloatArray:
+def palette(name: str = DEFAULT) -> FloatArray:
     """(MAX_COLOURS, 3) sRGB colours, 0 to 1: each as far as possible, to the eye, from all before it."""
+    recipe = RECIPES[name]
     candidates, lab = _candidates()
-    kept = _within(lab, LIGHTNESS, CHROMA)
-    candidates, lab = candidates[kept], lab[kept]
+    candidates = candidates[_within(lab, recipe.lightness, recipe.chroma)]
+    seen = recipe.seen(candidates)
     chosen = [np.array(FIRST)]
-    nearest = np.linalg.norm(lab - oklab(chosen[0]), axis=1)
+    nearest = _distance(seen, recipe.seen(chosen[0]))
     while len(chosen) < MAX_COLOURS:
         farthest = int(np.argmax(nearest))
         chosen.append(candidates[farthest])
-        nearest = np.minimum(nearest, np.linalg.norm(lab - lab[farthest], axis=1))
+        nearest = np.minimum(nearest, _distance(seen, seen[:, farthest]))
     colours = np.stack(chosen)
     colours.setflags(write=False)
     return colours
 
 
 @cache
-def sided_palette() -> FloatArray:
+def sided_palette(name: str = DEFAULT) -> FloatArray:
     """(3, MAX_COLOURS, 3) sRGB colours of the parts in the middle, which are those of the palette, left and right.
 
     Each as far as possible, to the eye, from all of the palette and from all sides before it.
     """
+    recipe, colors = RECIPES[name], palette(name)
     candidates, lab = _candidates()
+    seen, middle = recipe.seen(candidates), recipe.seen(colors)
     hue = _hue(lab)
-    middle = oklab(palette())
     factor = np.where(np.arange(MAX_COLOURS) < USUAL, 1, RARE)
-    nearest = np.min(
-        [np.linalg.norm(lab - colour, axis=1) * f for colour, f in zip(middle, factor, strict=True)], axis=0
-    )
-    colours = np.tile(palette(), (3, 1, 1))
-    allowed = [_within(lab, lightness, SIDED_CHROMA) for lightness in (LEFT, RIGHT)]
-    for segment, own in enumerate(_hue(middle)):
-        alike = np.cos(hue - own) >= np.cos(SIDED_HUE)
+    nearest = np.min([_distance(seen, middle[:, i]) * f for i, f in enumerate(factor)], axis=0)
+    colours = np.tile(colors, (3, 1, 1))
+    allowed = [_within(lab, lightness, SIDED_CHROMA) for lightness in (recipe.left, recipe.right)]
+    for segment, own in enumerate(_hue(oklab(colors))):
+        alike = np.cos(hue - own) >= np.cos(recipe.sided_hue)
         for side, within in enumerate(allowed, start=1):
             farthest = int(np.argmax(np.where(alike & within, nearest, -1)))
             colours[side, segment] = candidates[farthest]
-            nearest = np.minimum(nearest, np.linalg.norm(lab - lab[farthest], axis=1))
+            nearest = np.minimum(nearest, _distance(seen, seen[:, farthest]))
     colours.setflags(write=False)
     return colours
+
+
+def _distance(seen: FloatArray, color: FloatArray) -> FloatArray:
+    """(n,) distance of (k, n, 3) colours, as k see them, from one, for those to whom it is smallest."""
+    return np.asarray(np.linalg.norm(seen - color[:, None], axis=2).min(axis=0))
 
 
 def _candidates() -> tuple[FloatArray, FloatArray]:
@@ -105,9 +155,9 @@ def _hue(lab: FloatArray) -> FloatArray:
     return np.arctan2(lab[:, 2], lab[:, 1])
 
 
-def colors_of(parts: IntArray) -> FloatArray:
-    """(…, 3) sRGB color of each part; they repeat after MAX_COLOURS segments."""
-    return sided_palette()[sides_of(parts), segments_of(parts) % MAX_COLOURS]
+def colors_of(parts: IntArray, name: str = DEFAULT) -> FloatArray:
+    """(…, 3) sRGB color of each part in a palette; they repeat after MAX_COLOURS segments."""
+    return sided_palette(name)[sides_of(parts), segments_of(parts) % MAX_COLOURS]
 
 
 def most_different(used: FloatArray) -> FloatArray:
@@ -123,4 +173,8 @@ def linear(srgb: FloatArray) -> FloatArray:
 
 def oklab(srgb: FloatArray) -> FloatArray:
     """(…, 3) sRGB colours in OKLab, where a distance is what the eye sees."""
-    return np.cbrt(linear(srgb) @ _TO_CONES.T) @ _TO_LAB.T
+    return _lab_of_linear(linear(srgb))
+
+
+def _lab_of_linear(light: FloatArray) -> FloatArray:
+    return np.asarray(np.cbrt(np.clip(light, 0, 1) @ _TO_CONES.T) @ _TO_LAB.T)

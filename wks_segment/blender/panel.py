@@ -122,7 +122,27 @@ class WKS_SEGMENT_PT_outputs(SubPanel, bpy.types.Panel):
     bl_label = "Outputs"
 
     def draw(self, context: bpy.types.Context) -> None:
-        self.settings(context, "write_colors", "write_materials", "vertex_groups")
+        settings = self.settings(context, "palette", "write_colors", "write_materials")
+        if settings.write_materials:
+            self.settings(context, "material_template")
+        self.settings(context, "vertex_groups", "write_face_sets", "write_seams")
+
+        column = self.layout.column(align=True)
+        column.operator("wks_segment.unwrap", icon="UV")
+        column.operator("wks_segment.separate", icon="MOD_EXPLODE")
+        column.operator("wks_segment.transfer", icon="MOD_DATA_TRANSFER")
+        column.operator_menu_enum("wks_segment.segments_from", "source", icon="LOOP_BACK")
+
+
+class WKS_SEGMENT_PT_bake(SubPanel, bpy.types.Panel):
+    """The ID map."""
+
+    bl_label = "ID Map"
+    bl_parent_id = "WKS_SEGMENT_PT_outputs"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.settings(context, "bake_size", "bake_margin", "bake_unwrap")
+        self.layout.operator("wks_segment.bake", icon="RENDER_STILL")
 
 
 class WKS_SEGMENT_PT_model(SubPanel, bpy.types.Panel):
@@ -165,4 +185,10 @@ def wrapped(text: str) -> list[str]:
     return [short for line in joined.splitlines() for short in wrap(line, WIDTH)]
 
 
-CLASSES = (WKS_SEGMENT_PT_main, WKS_SEGMENT_PT_outputs, WKS_SEGMENT_PT_model, WKS_SEGMENT_PT_advanced)
+CLASSES = (
+    WKS_SEGMENT_PT_main,
+    WKS_SEGMENT_PT_outputs,
+    WKS_SEGMENT_PT_bake,
+    WKS_SEGMENT_PT_model,
+    WKS_SEGMENT_PT_advanced,
+)

@@ -121,18 +121,37 @@ def read_objects(context: bpy.types.Context, characters: Sequence[Character]) ->
     )
 
 
-def read_frames(context: bpy.types.Context, character: Character, frames: Sequence[int]) -> list[Pose]:
-    """One character at frames of its animation; the scene comes back to its own frame."""
+def read_frames(
+    context: bpy.types.Context, character: Character, frames: Sequence[int], names: Sequence[str] | None = None
+) -> list[Pose]:
+    """One character at frames of its animation, by these names; the scene comes back to its own frame."""
     scene = context.scene
     before, subframe = scene.frame_current, scene.frame_subframe
     try:
         poses = []
-        for frame in frames:
+        for frame, name in zip(frames, names or [f"frame {frame}" for frame in frames], strict=True):
             scene.frame_set(frame)
-            poses.append(read_pose(context, character, f"{character.name}, frame {frame}"))
+            poses.append(read_pose(context, character, f"{character.name}, {name}"))
         return with_rest(context, poses)
     finally:
         scene.frame_set(before, subframe=subframe)
+
+
+def read_markers(context: bpy.types.Context, character: Character, count: int) -> list[Pose]:
+    """One character at the frames of the timeline's markers, at most `count` of them, evenly chosen.
+
+    Raises
+    ------
+    UserError
+        If there are no markers.
+    """
+    names: dict[int, str] = {}
+    for marker in sorted(context.scene.timeline_markers, key=lambda marker: marker.frame):
+        names.setdefault(marker.frame, marker.name)
+    if not names:
+        raise UserError("There are no markers in the timeline: add some (M), or take poses from elsewhere")
+    frames = [list(names)[i] for i in evenly(0, len(names) - 1, count)]
+    return read_frames(context, character, frames, [names[frame] for frame in frames])
 
 
 def read_shape_keys(context: bpy.types.Context, character: Character, count: int) -> list[Pose]:

@@ -7,7 +7,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from ..core import PoseSegmentation
+from ..core.mesh import IntArray
 from . import parts
 from .certainty import certainties, certainty_lines
 from .poses import Pose
@@ -30,6 +33,12 @@ class Report:
         """Say how many segments a fitted model has, and how certain it is of each number."""
         self.n_segments, self.certainty = model.n_segments_, certainties(model)
         self.notes = certainty_lines(model)
+
+    def tell_of_parts(self, labels: IntArray) -> None:
+        """Say which parts there are among labels."""
+        occurring = parts.among(labels)
+        self.n_segments = len(np.unique(parts.segments_of(np.array(occurring))))
+        self.parts = {parts.name_of(part): part for part in occurring}
 
     def warn(self, text: str) -> None:
         """Warn of something, once."""

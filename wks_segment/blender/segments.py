@@ -16,7 +16,9 @@ from ..core.part_notes import LONGEST_NAME
 from . import parts
 from .characters import Character, mesh_objects
 from .edits import by_hand, keep_by_hand, model_labels, rewrite, values
-from .labels import COMPONENT, NOTE, has_labels, labels_on, note_of, recolor_material
+from .labels import has_labels, labels_on
+from .materials import COMPONENT, recolor_material
+from .notes import NOTE, note_of
 from .palette import most_different
 from .poses import polygon_ranges
 from .style import Style
@@ -93,7 +95,7 @@ def rewrite_all(settings: WKSSegmentSettings, objects: list[bpy.types.Object] | 
     """Write the labels of objects (None: of all in the scene) anew with the edits of now, and list them."""
     notes = settings.notes()
     for mesh in meshes_of(labelled(settings, everywhere=True) if objects is None else objects):
-        rewrite(mesh, Style.of(notes), notes.joined)
+        rewrite(mesh, settings.style(), notes.joined)
     fill(settings)
 
 

@@ -6,12 +6,20 @@ import json
 from typing import Any, Literal
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)  # fmt: skip
 
 from ..core import PartNotes, PoseSegmentation
 from .certainty import certainty_lines
 from .errors import UserError
-from .palette import MAX_COLOURS
+from .palette import DEFAULT, MAX_COLOURS, RECIPES
 from .segment_item import WKSSegmentItem
 from .session import session_of
 from .style import Style
@@ -83,12 +91,19 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
                 "Frames of the active character's animation. What is not keyed is lost, as in playback",
             ),
             ("SHAPE_KEYS", "Shape Keys", "Shape keys of the active character, each at its full value"),
+            ("MARKERS", "Timeline Markers", "Frames of the active character's animation that have a marker"),
+            (
+                "ACTIONS",
+                "Pose Library",
+                "Pose assets in this file that move bones of the active character, each from rest; if there are none, "
+                "all actions that do, each at its middle",
+            ),
         ],
         default="FRAMES",
     )
     pose_count: IntProperty(
         name="Count",
-        description="How many frames or shape keys to take, in equal steps. Three to five are enough for most",
+        description="How many frames, keys, markers or poses to take, in equal steps. Three to five will do for most",
         default=5, min=1, max=100, soft_max=12,
     )  # fmt: skip
     use_frame_range: BoolProperty(
@@ -212,6 +227,27 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         description="Add a material slot for each segment. The object's own materials come back with Clear",
         default=False,
     )
+    material_template: PointerProperty(
+        name="Template",
+        description="Material to copy for each segment. The color goes to its Base Color, or to the RGB node before it",
+        type=bpy.types.Material,
+    )
+    write_face_sets: BoolProperty(
+        name="Face Sets",
+        description="Put each segment into a face set of sculpt mode. The object's own face sets come back with Clear",
+        default=False,
+    )
+    write_seams: BoolProperty(
+        name="Seams",
+        description="Mark the borders of segments as UV seams, beside the object's own",
+        default=False,
+    )
+    palette: EnumProperty(
+        name="Palette",
+        description="Which colors the segments have",
+        items=[(name, recipe.title, recipe.description) for name, recipe in RECIPES.items()],
+        default=DEFAULT,
+    )
 
     vertex_groups: EnumProperty(
         name="Vertex Groups",
@@ -226,6 +262,22 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
             ("soft", "Soft", "How probable the segment is at each vertex. The weights of a vertex sum to 1"),
         ],
         default="none",
+    )
+
+    bake_size: IntProperty(
+        name="Size",
+        description="Width and height of the ID map",
+        default=2048, min=16, max=8192, soft_min=256, subtype="PIXEL",
+    )  # fmt: skip
+    bake_margin: IntProperty(
+        name="Margin",
+        description="How far the colors go beyond the UV islands, so that no gap shows",
+        default=16, min=0, max=1024, soft_max=64, subtype="PIXEL",
+    )  # fmt: skip
+    bake_unwrap: BoolProperty(
+        name="Unwrap if Needed",
+        description="Give an object without a UV map one of its own by Smart UV Project. Clear removes it",
+        default=False,
     )
 
     model: StringProperty(options={"HIDDEN"}, description="The learned model, as JSON")
@@ -276,7 +328,7 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
 
     def style(self) -> Style:
         """Names and colours of parts as the user has them."""
-        return Style.of(self.notes())
+        return Style.of(self.notes(), self.palette)
 
     def keep_model(self, model: PoseSegmentation, summary: list[str]) -> None:
         """Store a fitted model in the scene, with a few lines on where it is from and its number of segments."""

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..core import PartNotes
 from ..core.mesh import FloatArray, IntArray
-from . import palette, parts
+from . import parts
+from .palette import DEFAULT, colors_of
 
 
 @dataclass(frozen=True)
@@ -22,15 +23,18 @@ class Style:
         By the part's number; others are called as `parts.name_of` calls them.
     colors
         (3,) sRGB, 0 to 1, by the part's number; others have that of the palette.
+    palette
+        Name of the palette, one of `palette.RECIPES`.
     """
 
     names: Mapping[int, str] = field(default_factory=dict)
     colors: Mapping[int, FloatArray] = field(default_factory=dict)
+    palette: str = DEFAULT
 
     @classmethod
-    def of(cls, notes: PartNotes) -> Style:
-        """As a user has noted it."""
-        return cls(notes.names, {part: np.array(color) for part, color in notes.colors.items()})
+    def of(cls, notes: PartNotes, of_others: str = DEFAULT) -> Style:
+        """As a user has noted it, and the palette for other parts."""
+        return cls(notes.names, {part: np.array(color) for part, color in notes.colors.items()}, of_others)
 
     def name_of(self, part: int) -> str:
         """As a person reads it."""
@@ -38,7 +42,7 @@ class Style:
 
     def colors_of(self, numbers: IntArray) -> FloatArray:
         """(…, 3) sRGB colour of each part, given (…) numbers."""
-        colors = palette.colors_of(numbers).copy()
+        colors = colors_of(numbers, self.palette).copy()
         for part, color in self.colors.items():
             colors[np.asarray(numbers) == part] = color
         return colors

@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+import bpy
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -43,8 +44,11 @@ class Wanted:
         Smallest connected part, as a share of the area.
     sides : "one" or "two"
     vertex_groups : "none", "hard" or "soft"
-    colors, materials : bool
+    colors, materials, face_sets, seams : bool
         Whether they are written.
+    template : str
+        Name of the material that those of parts are copies of; empty: none.
+    style : Style
     bodies
         Of the characters that are labelled.
     """
@@ -54,6 +58,10 @@ class Wanted:
     vertex_groups: str
     colors: bool
     materials: bool
+    face_sets: bool
+    seams: bool
+    template: str
+    style: Style
     bodies: dict[Character, Body]
 
     @classmethod
@@ -65,6 +73,10 @@ class Wanted:
             settings.vertex_groups,
             settings.write_colors,
             settings.write_materials,
+            settings.write_face_sets,
+            settings.write_seams,
+            settings.material_template.name if settings.material_template is not None else "",
+            settings.style(),
             {character: Body.of(character, settings.snap_to) for character in dict.fromkeys(characters)},
         )
 
@@ -190,10 +202,8 @@ def label(
                 found = parts.numbered(found, sides)
             found = filled(found, body)
             labels |= {poses[i].character: found for i in mine}
-    occurring = parts.among(np.concatenate(list(labels.values())))
-    report.n_segments = len(np.unique(parts.segments_of(np.array(occurring))))
-    report.parts = {parts.name_of(part): part for part in occurring}
-    if wanted.sides == "two" and len(occurring) == report.n_segments:
+    report.tell_of_parts(np.concatenate(list(labels.values())))
+    if wanted.sides == "two" and len(report.parts) == report.n_segments:
         report.warn(
             "Left and right are not told apart with the method of the paper: parts are one for both sides"
             if model.regions_ is None
@@ -255,10 +265,12 @@ def write(
 
     If parts may have other numbers than those that are on the objects now, since the model is new, the edits follow.
     """
+    if soft is None and wanted.vertex_groups == "soft":
+        report.warn("The vertex groups are hard: only a model says how probable a segment is (Apply to Selected)")
     if renumbered:
         segments.carry_over(settings, labels)
-    notes, written = settings.notes(), [np.zeros(0, dtype=np.int64)]
-    style = Style.of(notes)
+    notes, style, written = settings.notes(), settings.style(), [np.zeros(0, dtype=np.int64)]
+    template = bpy.data.materials.get(wanted.template)
     with report.stage("write"):
         for character, values in labels.items():
             ranges = zip(reader.polygon_ranges(character), reader.vertex_ranges(character), strict=True)
@@ -268,7 +280,7 @@ def write(
                 weights = None if soft is None else {part: of[vertices] for part, of in soft[character].items()}
                 final = write_edited(
                     obj.data, values[polygons], style, notes.joined, wanted.colors, wanted.materials, weights,
-                    hard=wanted.vertex_groups == "hard",
+                    wanted.vertex_groups != "none" and soft is None, wanted.face_sets, wanted.seams, template,
                 )  # fmt: skip
                 written.append(final)
         segments.fill(settings)

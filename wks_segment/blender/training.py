@@ -9,6 +9,7 @@ import bpy
 from . import poses as reader
 from .characters import Character, armature_of, group, mesh_objects
 from .errors import UserError
+from .pose_library import read_actions
 from .poses import Pose
 from .report import Report, pose_warnings
 from .settings import WKSSegmentSettings
@@ -30,11 +31,15 @@ def read_training_poses(context: bpy.types.Context, settings: WKSSegmentSettings
             character = active_character(context, characters)
             if settings.source == "SHAPE_KEYS":
                 poses = reader.read_shape_keys(context, character, settings.pose_count)
+            elif settings.source == "MARKERS":
+                poses = reader.read_markers(context, character, settings.pose_count)
+            elif settings.source == "ACTIONS":
+                poses = read_actions(context, character, settings.pose_count)
             else:
                 frames = chosen_frames(context.scene, character, settings)
                 poses = reader.read_frames(context, character, frames)
     report.poses = poses
-    report.warnings += pose_warnings(poses, settings.source == "FRAMES")
+    report.warnings += pose_warnings(poses, settings.source in ("FRAMES", "MARKERS"))
     return poses
 
 

@@ -38,7 +38,9 @@ def write_groups(
         found = parts.among(np.array([part for part, of_part in weights.items() if of_part.any()], dtype=np.int64))
         names = [NAME.format(style.name_of(part)) for part in found]
         groups = [holder.vertex_groups.new(name=_free_name(holder, name)) for name in names]
-        note["vertex_groups"], note["group_parts"] = [group.name for group in groups], found
+        note["own_groups"] = [group.name for group in holder.vertex_groups if group not in groups]
+        note["vertex_groups"] = [group.name for group in groups]
+        note["group_parts"] = found
         for part, group in zip(found, groups, strict=True):
             _fill(group, weights[part].astype(np.float32))
         _activate(holder, shown, note["active_group"], *note["vertex_groups"])
@@ -92,6 +94,25 @@ def active_group(mesh: bpy.types.Mesh) -> str | None:
     with _holder(mesh) as holder:
         active = holder.vertex_groups.active
         return None if active is None else active.name
+
+
+def our_groups(mesh: bpy.types.Mesh, note: dict[str, Any]) -> dict[str, int]:
+    """Names of the groups that `write_groups` noted and that are still there, and the part of each."""
+    with _holder(mesh) as holder:
+        there = holder.vertex_groups.keys()
+        pairs = zip(note.get("vertex_groups", []), note.get("group_parts", []), strict=False)
+        return {name: part for name, part in pairs if name in there}
+
+
+def group_weights(mesh: bpy.types.Mesh) -> dict[str, FloatArray]:
+    """(n,) weights of each vertex group; 0 for vertices that are not in it."""
+    with _holder(mesh) as holder:
+        names = holder.vertex_groups.keys()
+    weights = np.zeros((len(names), len(mesh.vertices)))
+    for vertex in mesh.vertices:
+        for member in vertex.groups:
+            weights[member.group, vertex.index] = member.weight
+    return dict(zip(names, weights, strict=True))
 
 
 def free_name(mesh: bpy.types.Mesh, name: str) -> str:

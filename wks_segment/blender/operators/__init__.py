@@ -3,6 +3,7 @@
 from .accept import WKS_SEGMENT_OT_accept
 from .apply import WKS_SEGMENT_OT_apply
 from .assign_faces import WKS_SEGMENT_OT_assign_faces, WKS_SEGMENT_OT_forget_faces, WKS_SEGMENT_OT_new_segment
+from .bake import WKS_SEGMENT_OT_bake
 from .cancel import WKS_SEGMENT_OT_cancel
 from .clear import WKS_SEGMENT_OT_clear
 from .discard import WKS_SEGMENT_OT_discard
@@ -12,9 +13,13 @@ from .merge_segments import WKS_SEGMENT_OT_merge_segments
 from .name_segment import WKS_SEGMENT_OT_name_segment
 from .restore_segments import WKS_SEGMENT_OT_refresh_segments, WKS_SEGMENT_OT_restore_segments
 from .save_model import WKS_SEGMENT_OT_save_model
+from .segments_from import WKS_SEGMENT_OT_segments_from
 from .select_segment import WKS_SEGMENT_OT_select_segment
+from .separate import WKS_SEGMENT_OT_separate
 from .show_segments import WKS_SEGMENT_OT_hide_segment, WKS_SEGMENT_OT_isolate_segment, WKS_SEGMENT_OT_show_segments
 from .split_segment import WKS_SEGMENT_OT_split_segment
+from .transfer import WKS_SEGMENT_OT_transfer
+from .unwrap import WKS_SEGMENT_OT_unwrap
 from .update import WKS_SEGMENT_OT_update
 
 CLASSES = (
@@ -25,6 +30,11 @@ CLASSES = (
     WKS_SEGMENT_OT_accept,
     WKS_SEGMENT_OT_discard,
     WKS_SEGMENT_OT_clear,
+    WKS_SEGMENT_OT_bake,
+    WKS_SEGMENT_OT_unwrap,
+    WKS_SEGMENT_OT_separate,
+    WKS_SEGMENT_OT_transfer,
+    WKS_SEGMENT_OT_segments_from,
     WKS_SEGMENT_OT_save_model,
     WKS_SEGMENT_OT_load_model,
     WKS_SEGMENT_OT_select_segment,

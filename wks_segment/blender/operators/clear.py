@@ -7,6 +7,7 @@ import bpy
 from .. import segments
 from ..characters import mesh_objects
 from ..labels import clear_labels, has_labels
+from ..separate import unite, whole_of
 from . import feedback
 
 
@@ -19,14 +20,11 @@ class WKS_SEGMENT_OT_clear(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not feedback.in_object_mode(cls, context):
-            return False
-        if not any(has_labels(obj.data) for obj in mesh_objects(context.selected_objects)):
-            cls.poll_message_set("Select an object that has segments")
-            return False
-        return True
+        return feedback.in_object_mode(cls, context) and feedback.has_labelled_mesh(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
+        wholes = {whole for obj in context.selected_objects if (whole := whole_of(obj)) is not None}
+        kept = sum(unite(context, whole) for whole in wholes)
         meshes = {obj.data for obj in mesh_objects(context.selected_objects) if obj.data.library is None}
         cleared = sum(clear_labels(mesh) for mesh in meshes)
         context.scene.wks_segment.applied = ""
@@ -34,4 +32,6 @@ class WKS_SEGMENT_OT_clear(bpy.types.Operator):
         if not any(has_labels(mesh) for mesh in bpy.data.meshes):
             feedback.hide_colors(context)
         self.report({"INFO"}, f"Cleared the segments of {cleared} mesh{'es' * (cleared != 1)}")
+        if kept:
+            self.report({"WARNING"}, f"{kept} separated objects were worked on since, and stay")
         return {"FINISHED"}

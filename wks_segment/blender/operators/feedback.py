@@ -11,6 +11,7 @@ from ...core.description import Progress
 from .. import segments
 from ..characters import mesh_objects, why_no_mesh
 from ..jobs import BUSY, desk_of
+from ..labels import has_labels
 from ..report import Report
 from ..session import session_of
 
@@ -81,6 +82,14 @@ def has_selected_mesh(cls: type[bpy.types.Operator], context: bpy.types.Context)
     """For `poll`: whether a mesh is selected; sets the message if not."""
     if not mesh_objects(context.selected_objects):
         cls.poll_message_set(why_no_mesh(context.selected_objects))
+        return False
+    return True
+
+
+def has_labelled_mesh(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """For `poll`: whether a selected mesh has segments; sets the message if not."""
+    if not any(has_labels(obj.data) for obj in mesh_objects(context.selected_objects)):
+        cls.poll_message_set("Select an object that has segments")
         return False
     return True
 

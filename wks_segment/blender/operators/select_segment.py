@@ -7,7 +7,7 @@ import bpy
 from bpy.props import BoolProperty
 
 from .. import segments
-from ..labels import note_of
+from ..notes import note_of
 from . import feedback
 
 

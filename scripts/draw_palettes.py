@@ -1,0 +1,52 @@
+"""Draws the palettes to choose from, as people with and without all cones see them: docs/images/palettes.png."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from wks_segment.blender.palette import BLINDNESS, RECIPES, linear, sided_palette
+from wks_segment.core.mesh import FloatArray
+
+COLORS = 16
+CELL, GAP, LEFT = 44, 26, 150
+"""Width of a color, space above a palette, and space for names, in pixels."""
+EYES = {"all cones": np.eye(3), **dict(zip(("without red", "without green", "without blue"), BLINDNESS, strict=True))}
+TEXT = (40, 40, 40)
+
+
+def main(path: Path) -> None:
+    """Write the picture."""
+    height = len(RECIPES) * (GAP + len(EYES) * CELL)
+    picture = Image.new("RGB", (LEFT + COLORS * CELL, height), "white")
+    draw = ImageDraw.Draw(picture)
+    for i, (name, recipe) in enumerate(RECIPES.items()):
+        top = i * (GAP + len(EYES) * CELL)
+        draw.text((4, top + 8), recipe.title, TEXT, font_size=14)
+        middle, left, right = sided_palette(name)[:, :COLORS]
+        for row, (who, eyes) in enumerate(EYES.items()):
+            y = top + GAP + row * CELL
+            draw.text((16, y + CELL // 2 - 8), who, TEXT, font_size=12)
+            for column, (whole, light, dark) in enumerate(
+                zip(*(_bytes(colors, eyes) for colors in (middle, left, right)), strict=True)
+            ):
+                x = LEFT + column * CELL
+                draw.rectangle((x, y, x + CELL - 3, y + 2 * CELL // 3 - 2), tuple(whole))
+                draw.rectangle((x, y + 2 * CELL // 3, x + CELL // 2 - 2, y + CELL - 3), tuple(light))
+                draw.rectangle((x + CELL // 2, y + 2 * CELL // 3, x + CELL - 3, y + CELL - 3), tuple(dark))
+    picture.save(path, optimize=True)
+
+
+def _bytes(srgb: FloatArray, eyes: FloatArray) -> list[list[int]]:
+    """(n, 3) sRGB colors as somebody sees them, in 8 bits."""
+    light = np.clip(linear(srgb) @ eyes.T, 0, 1)
+    seen = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    rounded: list[list[int]] = np.rint(255 * seen).astype(int).tolist()
+    return rounded
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("docs/images/palettes.png"))

@@ -1,0 +1,44 @@
+"""Bake ID Map."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..bake import bake_id_maps
+from ..characters import group, mesh_objects
+from ..errors import UserError
+from . import feedback
+
+
+class WKS_SEGMENT_OT_bake(bpy.types.Operator):
+    """Bake the segments of the selected objects to an image of flat colors in their UV maps, with Cycles on the CPU"""
+
+    bl_idname = "wks_segment.bake"
+    bl_label = "Bake ID Map"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return (
+            feedback.no_job_runs(cls, context)
+            and feedback.in_object_mode(cls, context)
+            and feedback.has_labelled_mesh(cls, context)
+        )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        settings = context.scene.wks_segment
+        size, margin, unwrap = settings.bake_size, settings.bake_margin, settings.bake_unwrap
+        images: list[str] = []
+        warnings: list[str] = []
+        try:
+            with feedback.cursor_progress(context) as progress:
+                for character in group(mesh_objects(context.selected_objects)):
+                    baked = bake_id_maps(context, character, settings.style(), size, margin, unwrap, warnings, progress)
+                    images += [f'"{id_map.image.name}"' for id_map in baked]
+        except UserError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"Baked {', '.join(images)}: {size} × {size} pixels, kept in this file")
+        for warning in warnings:
+            self.report({"WARNING"}, warning)
+        return {"FINISHED"}

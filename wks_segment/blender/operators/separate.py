@@ -1,0 +1,44 @@
+"""Separate by Segments."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..characters import group, mesh_objects
+from ..errors import UserError
+from ..labels import labels_on
+from ..separate import separate, whole_of
+from . import feedback
+
+
+class WKS_SEGMENT_OT_separate(bpy.types.Operator):
+    """Make an object of each segment of the selected objects. These are hidden, and come back with Clear"""
+
+    bl_idname = "wks_segment.separate"
+    bl_label = "Separate by Segments"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return (
+            feedback.no_job_runs(cls, context)
+            and feedback.in_object_mode(cls, context)
+            and feedback.has_labelled_mesh(cls, context)
+        )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        style = context.scene.wks_segment.style()
+        pieces = []
+        try:
+            for character in group(mesh_objects(context.selected_objects)):
+                for obj in character.objects:
+                    if whole_of(obj) is not None:
+                        raise UserError(f'"{obj.name}" is separated already: Clear it first')
+                    labels = labels_on(obj.data)
+                    if labels is not None:
+                        pieces += separate(context, obj, labels, style)
+        except UserError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"Separated into {len(pieces)} objects")
+        return {"FINISHED"}

@@ -1,0 +1,44 @@
+"""Unwrap Segments."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import EnumProperty
+
+from ..characters import group, mesh_objects
+from ..errors import UserError
+from ..labels import labels_on
+from ..uv_maps import METHODS, check_room, unwrap_parts, write_uv_map
+from . import feedback
+
+
+class WKS_SEGMENT_OT_unwrap(bpy.types.Operator):
+    """Unwrap the selected objects along the borders of segments, into a UV map of its own, segment by segment"""
+
+    bl_idname = "wks_segment.unwrap"
+    bl_label = "Unwrap Segments"
+    bl_options = {"REGISTER", "UNDO"}
+
+    method: EnumProperty(name="Method", description="Where else islands are cut", items=METHODS)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return (
+            feedback.no_job_runs(cls, context)
+            and feedback.in_object_mode(cls, context)
+            and feedback.has_labelled_mesh(cls, context)
+        )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        try:
+            objects = [obj for of in group(mesh_objects(context.selected_objects)) for obj in of.objects]
+            meshes = {obj.data: labels for obj in objects if (labels := labels_on(obj.data)) is not None}
+            for mesh in meshes:
+                check_room(mesh)
+            for mesh, labels in meshes.items():
+                write_uv_map(mesh, unwrap_parts(context, mesh, labels, self.method))
+        except UserError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"Unwrapped {len(meshes)} mesh{'es' * (len(meshes) != 1)} by segments")
+        return {"FINISHED"}
