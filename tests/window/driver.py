@@ -213,9 +213,8 @@ class RealBlender:
 
     def open_sidebar(self, tab: str = "WKS") -> None:
         """Press N over the viewport, and click on a tab."""
-        x, y, width, height = self.ask("region", "WINDOW")
         if not self.ask("tab"):
-            self.move(x + width // 3, y + height // 2)
+            self.over_viewport()
             self.key("n")
             self.wait_for("tab", patience=10)
         x, y, width, height = self.ask("region", "UI")
@@ -255,6 +254,17 @@ class RealBlender:
         self.key("ctrl+a")
         self.type(text)
         self.key("Return")
+
+    def choose(self, name: str, letter: str) -> None:
+        """Open a menu of the side panel and press the letter that is underlined in an item."""
+        self.press(name)
+        self.key(letter)
+        self.clicks += 1  # a person clicks
+
+    def over_viewport(self) -> None:
+        """Move the mouse to where keys mean the viewport."""
+        x, y, width, height = self.ask("region", "WINDOW")
+        self.move(x + width // 3, y + height - 40)
 
     def _run_along(self, *command: str) -> None:
         with open(self.shared / f"{command[0]}.log", "wb") as log:

@@ -130,6 +130,16 @@ def segments(name):
     return {str(part): int(count) for part, count in zip(*np.unique(values, return_counts=True), strict=True)}
 
 
+def n_segments(name, count):
+    """Whether an object has that many segments."""
+    return len(segments(name)) == count
+
+
+def groups(name, beginning):
+    """Names of an object's vertex groups that begin so."""
+    return [group.name for group in bpy.data.objects[name].vertex_groups if group.name.startswith(beginning)]
+
+
 def contents(name):
     """A fingerprint of each thing that an artist could miss of an object: attributes, slots, groups, weights."""
     obj = bpy.data.objects[name]
