@@ -1,12 +1,10 @@
 """The window tests run only when they are asked for: `make test-window`. See README.md."""
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-from driver import HERE, SUITES, RealBlender
+from driver import HERE, SUITES, RealBlender, build_zip
 
 ROOT = HERE.parents[1]
 FOLDER = os.environ.get("WKS_SEGMENT_WINDOW")
@@ -26,11 +24,7 @@ def pytest_generate_tests(metafunc):
 
 @pytest.fixture(scope="session")
 def extension_zip(tmp_path_factory):
-    """The extension as it is now, for the Pythons that Debian's Blenders have."""
-    folder = tmp_path_factory.mktemp("dist")
-    build = [sys.executable, ROOT / "scripts" / "build_zip.py", "--platform", "linux-x64", "--python", "3.13", "3.14"]
-    subprocess.run([*build, "--output", folder], check=True)
-    return next(folder.glob("*.zip"))
+    return build_zip(tmp_path_factory.mktemp("dist"))
 
 
 @pytest.fixture(scope="session")
@@ -40,8 +34,7 @@ def blender(request):
         pytest.skip("needs root, a Debian mirror and 2 GB for a real Blender: make test-window")
     with RealBlender(request.param, Path(FOLDER)) as blender:
         blender.install_extension(request.getfixturevalue("extension_zip"))
-        make = blender.bring(HERE / "make_scene.py")
-        blender.command("--background", "--python-exit-code", "1", "--python", make, "--", "creature", SCENE)
+        blender.make_scene("creature", Path(SCENE).name)
         yield blender
 
 
@@ -49,8 +42,8 @@ SCENE = "/window/creature.blend"
 
 
 @pytest.fixture
-def window(blender, request):
-    """Blender's window with the creature before it; a picture of it is taken when a test fails."""
+def window(blender):
+    """Blender's window with the creature before it."""
     blender.clicks = 0
     blender.start(SCENE)
     blender.ask("zoom_to_all")

@@ -12,6 +12,7 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,6 @@ SUITES = {"5.2": "sid", "4.3": "trixie"}
 """Which Debian has which Blender."""
 WIDTH, HEIGHT = 1280, 960
 """Size of the screen: high enough for the whole side panel."""
-ADDON = "bl_ext.user_default.wks_segment"
 MOUNTS = (
     ("proc", ["-t", "proc", "proc"]),
     ("sys", ["--bind", "/sys"]),
@@ -33,6 +33,14 @@ HEADER = 26
 """Height of the header of a sub-panel."""
 PATIENCE = 600
 """Seconds after which Blender is taken to hang."""
+
+
+def build_zip(folder: Path) -> Path:
+    """The extension as it is now, for the Pythons that Debian's Blenders have."""
+    script = HERE.parents[1] / "scripts" / "build_zip.py"
+    command = [sys.executable, str(script), "--platform", "linux-x64", "--python", "3.13", "3.14"]
+    subprocess.run([*command, "--output", str(folder)], check=True, stdout=subprocess.DEVNULL)
+    return next(folder.glob("*.zip"))
 
 
 class WindowError(Exception):
@@ -75,9 +83,8 @@ class RealBlender:
 
     def command(self, *arguments: str | Path) -> str:
         """Run Blender without a window to its end; what it printed. The user's settings are those of the window."""
-        done = subprocess.run(
-            self._inside("blender", *arguments), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
-        )
+        inside = self._inside("blender", *arguments)
+        done = subprocess.run(inside, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
         if done.returncode:
             raise WindowError(f"blender {' '.join(map(str, arguments))}\n{done.stdout}")
         return done.stdout
@@ -87,6 +94,13 @@ class RealBlender:
         self.command(
             "--command", "extension", "install-file", "--repo", "user_default", "--enable", self.bring(path)
         )  # fmt: skip
+
+    def make_scene(self, what: str, name: str) -> str:
+        """Make a scene with `make_scene.py`; where it is. Other files that it needs are brought before."""
+        path = f"/window/{name}"
+        self.command("--background", "--python-exit-code", "1", "--python", self.bring(HERE / "make_scene.py"),
+                     "--", what, path)  # fmt: skip
+        return path
 
     def bring(self, path: Path) -> str:
         """Copy a file to where Blender can see it; its name there."""
@@ -185,7 +199,9 @@ class RealBlender:
         while not answer.exists():
             gone = any(process.poll() is not None for process in self._running)
             if gone or time.monotonic() > deadline:
-                raise WindowError(f"no answer to {question}: Blender is {'gone' if gone else 'busy'}\n{self.log()[-3000:]}")
+                raise WindowError(
+                    f"no answer to {question}: Blender is {'gone' if gone else 'busy'}\n{self.log()[-3000:]}"
+                )
             time.sleep(0.02)
         number, failed, value = json.loads(answer.read_text())
         if failed or number != self._asked:

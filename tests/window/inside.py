@@ -16,7 +16,7 @@ from math import radians
 import bpy
 import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
-from mathutils import Euler
+from mathutils import Euler, Vector
 
 FOLDER = "/window/"
 TICK = 0.04
@@ -90,12 +90,15 @@ def view():
 def zoom_to_all(azimuth=-60.0, height=75.0):
     """A view of all, from the side: a starting point, not a step of the way."""
     area = _view3d()
-    with bpy.context.temp_override(window=_window(), area=area, region=_region("WINDOW")):
-        bpy.ops.view3d.view_all()
     area.spaces.active.region_3d.view_rotation = Euler((radians(height), 0, radians(azimuth))).to_quaternion()
     yield from settle()
     with bpy.context.temp_override(window=_window(), area=area, region=_region("WINDOW")):
         bpy.ops.view3d.view_all()
+    yield from settle()
+    # To the left, out of the way of the side panel.
+    eye = area.spaces.active.region_3d
+    eye.view_location += eye.view_rotation @ Vector((0.13 * eye.view_distance, 0, 0))
+    eye.view_distance *= 1.15
     yield from settle()
 
 
@@ -130,6 +133,17 @@ def segments(name):
     return {str(part): int(count) for part, count in zip(*np.unique(values, return_counts=True), strict=True)}
 
 
+def job_runs():
+    """Whether there is something to cancel."""
+    with bpy.context.temp_override(window=_window(), area=_view3d()):
+        return bpy.ops.wks_segment.cancel.poll()
+
+
+def job_is_over():
+    """Whether there is nothing to cancel."""
+    return not job_runs()
+
+
 def n_segments(name, count):
     """Whether an object has that many segments."""
     return len(segments(name)) == count
@@ -153,7 +167,7 @@ def contents(name):
     weights = [[(each.group, each.weight) for each in vertex.groups] for vertex in mesh.vertices]
     found["weights"] = zlib.crc32(repr(weights).encode())
     found["slots"] = [material.name if material else None for material in mesh.materials]
-    found["active color"] = mesh.attributes.active_color_name
+    found["shown colors"] = [mesh.attributes.active_color_name, mesh.attributes.default_color_name]
     found["own properties"] = sorted(mesh.keys())
     found["seams"] = sum(edge.use_seam for edge in mesh.edges)
     found["uv layers"] = [layer.name for layer in mesh.uv_layers]

@@ -71,6 +71,10 @@ def clear_labels(mesh: bpy.types.Mesh) -> bool:
             mesh.attributes.remove(attribute)
     if note.get("had_material_index") is False and "material_index" in mesh.attributes:
         mesh.attributes.remove(mesh.attributes["material_index"])
+    # In 5.2 their names outlive the attribute that was active.
+    for kind in ("active_color_name", "default_color_name"):
+        if "colors" in note and getattr(mesh.attributes, kind) == note["colors"]:
+            setattr(mesh.attributes, kind, "")
     active = mesh.color_attributes.get(note.get("active_color", ""))
     if active is not None:
         mesh.color_attributes.active_color = active

@@ -37,12 +37,11 @@ class _Sidebar:
     def segments(self, context: bpy.types.Context) -> None:
         """Show the number of segments, grey where it is found."""
         settings = context.scene.wks_segment
-        row = self.layout.row(align=True)
-        number = row.row(align=True)
-        number.use_property_split, number.use_property_decorate = True, False
+        column = self.layout.column()
+        number = column.column()
         number.enabled = not settings.auto_segments
         number.prop(settings, "n_segments")
-        row.prop(settings, "auto_segments", toggle=True)
+        column.prop(settings, "auto_segments")
 
     def job(self, context: bpy.types.Context) -> None:
         """Show how far the running job is, or why the last one was ended."""
