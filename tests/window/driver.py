@@ -107,9 +107,11 @@ class RealBlender:
         shutil.copyfile(path, self.shared / path.name)
         return f"/window/{path.name}"
 
-    def start(self, *arguments: str) -> None:
-        """Open the window, with a file if its name is given, and wait until it draws."""
+    def start(self, *arguments: str, beautiful: bool = False) -> None:
+        """Open the window, with a file if its name is given, and wait until it draws; beautiful is slow."""
         self.bring(HERE / "inside.py")
+        if beautiful:
+            (self.shared / "beautiful").touch()
         for name in ("answer", "question"):
             (self.shared / name).unlink(missing_ok=True)
         screen = f"{WIDTH}x{HEIGHT}x24"
