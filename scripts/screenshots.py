@@ -1,7 +1,7 @@
 """Makes the pictures of the docs that show Blender's window: `make screenshots`, into `docs/images`.
 
-Opens a real Blender with the extension as it is now, and does with mouse and keyboard what the docs tell. `tests/window`
-says how, and what it needs; WKS_SEGMENT_WINDOW names the folder where Blender is or gets installed.
+Opens a real Blender with the extension as it is now, and does with mouse and keyboard what the docs tell.
+`tests/window` says how, and what it needs; WKS_SEGMENT_WINDOW names the folder where Blender is or gets installed.
 """
 
 from __future__ import annotations
