@@ -1,6 +1,7 @@
 """The window tests run only when they are asked for: `make test-window`. See README.md."""
 
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -54,7 +55,8 @@ def window(blender):
 @pytest.fixture
 def shot(blender, request):
     """A function that keeps a picture of the window, numbered in the order of the steps."""
-    folder = PICTURES / blender.version / request.node.originalname.removeprefix("test_")
+    test = request.node.name.removeprefix("test_").replace(blender.version, "")
+    folder = PICTURES / blender.version / re.sub(r"\W+", "_", test).strip("_")
     taken = []
     for old in folder.glob("*.png"):
         old.unlink()

@@ -160,13 +160,13 @@ class RealBlender:
         self.settle()
 
     def drag(self, x: int, y: int, to_x: int, to_y: int, button: int = 1) -> None:
-        """Press there and let go elsewhere."""
+        """Press there and let go elsewhere; slowly, since a busy Blender takes a quick one for a click."""
         self.move(x, y)
         middle = ((x + to_x) // 2, (y + to_y) // 2)
-        path = [step for point in (middle, (to_x, to_y)) for step in ("mousemove", *point, "sleep", "0.1")]
-        self._xdotool("mousedown", button, *path, "mouseup", button)
+        for step in (("mousedown", button), ("mousemove", *middle), ("mousemove", to_x, to_y), ("mouseup", button)):
+            self._xdotool(*step)
+            self.settle()
         self.clicks += 1
-        self.settle()
 
     def key(self, *names: str) -> None:
         """Press keys one after the other, as `ctrl+z`; where the mouse is decides what they do."""
