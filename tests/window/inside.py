@@ -67,7 +67,7 @@ def button(name, kind="UI"):
             if here == name:
                 return [x, y + STEP // 3]
             found[here] = [x, y]
-            if here == "" and y > STEP * 12 + max((place[1] for key, place in found.items() if key), default=top + 400):
+            if here == "" and y > STEP * 26 + max((place[1] for key, place in found.items() if key), default=top + 400):
                 break  # below the last panel
     return {key: place for key, place in found.items() if key}
 
