@@ -71,6 +71,7 @@ def test_an_output_at_a_time_is_undone_to_the_byte(window, shot):
     window.enter("pose_count", "2")
     window.press("wks_segment.learn")
     window.wait_for("segments", BODY)
+    window.wait_for("job_is_over")
     for step, choose in {
         "materials": lambda: window.press("write_materials"),
         "hard groups": lambda: window.choose("vertex_groups", "h"),
@@ -81,6 +82,7 @@ def test_an_output_at_a_time_is_undone_to_the_byte(window, shot):
         choose()
         before, settings = window.ask("contents", BODY), window.ask("state")["settings"]
         window.press("wks_segment.apply")
+        window.wait_for("job_is_over")
         written = window.ask("contents", BODY)
         assert written != before, f"{step}: nothing was written"
         shot(step)
