@@ -47,6 +47,8 @@ class _Sidebar:
         """Show how far the running job is, or why the last one was ended."""
         desk = desk_of(context)
         stage, left = desk.job.lines if desk.job is not None else (desk.said, "")
+        if not stage:
+            return
         column = self.layout.column(align=True)
         for line in wrapped(stage):
             column.label(text=line)
@@ -132,8 +134,8 @@ class WKS_SEGMENT_PT_advanced(_SubPanel, bpy.types.Panel):
 
 
 def wrapped(text: str) -> list[str]:
-    """Lines that the sidebar has room for; what is a pair of numbers stays together."""
-    joined = re.sub(r"(?<=\d) (?=\d)", "\N{NO-BREAK SPACE}", text)
+    """Lines that the sidebar has room for; what is a pair of numbers stays together, as "3 of 5" does."""
+    joined = re.sub(r"(?<=\d) (?=\d|of \d)|(?<=\d of) (?=\d)", "\N{NO-BREAK SPACE}", text)
     return [short for line in joined.splitlines() for short in wrap(line, WIDTH)]
 
 
