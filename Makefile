@@ -5,8 +5,9 @@ OLDEST := .venv-oldest
 RUN := $(VENV)/bin/python
 PLATFORM ?=
 SEGMENTS ?= 6
+BLENDERS ?= window
 
-.PHONY: help demo test test-oldest fuzz lint zip clean
+.PHONY: help demo test test-oldest test-window screenshots fuzz lint zip clean
 
 help:  ## list the commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
@@ -19,6 +20,12 @@ test: $(VENV)/.ready  ## all tests
 
 test-oldest: $(OLDEST)/.ready  ## all tests on the oldest Blender that is supported
 	$(OLDEST)/bin/python -m pytest
+
+test-window: $(VENV)/.ready  ## a real Blender 5.2 and 4.3, with mouse and keyboard (root; 4.4 GB in BLENDERS=window)
+	WKS_SEGMENT_WINDOW="$(abspath $(BLENDERS))" $(RUN) -m pytest tests/window
+
+screenshots: $(VENV)/.ready  ## the pictures of the docs that show the window, from a real Blender
+	WKS_SEGMENT_WINDOW="$(abspath $(BLENDERS))" $(RUN) -m scripts.screenshots
 
 fuzz: $(VENV)/.ready  ## thousands of broken meshes and model files, with counts (takes ten minutes)
 	$(RUN) -m pytest tests -k "any_" --hypothesis-profile fuzz --timeout 7200

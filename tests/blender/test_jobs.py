@@ -517,7 +517,7 @@ def test_panel_shows_how_far_it_is_and_why_it_ended(poses, at):
     job.stage, job.share = 'Signature of "Fox, frame 12" (3 of 5)', 0.375
     column = drawn()
     lines = [call.kwargs["text"] for call in column.label.call_args_list]
-    assert " ".join(lines) == "Signature of Fox, frame 12 · 3 of 5"
+    assert " ".join(lines) == "Signature of Fox, frame 12 · 3\N{NO-BREAK SPACE}of\N{NO-BREAK SPACE}5"
     column.row.return_value.progress.assert_called_once_with(factor=0.375, text="38 %")
     assert column.row.return_value.operator.call_args.args == ("wks_segment.cancel",)
     OPS.cancel()

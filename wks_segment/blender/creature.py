@@ -37,15 +37,15 @@ JOINTS = (
     Joint("brow", "skull", (0.0, -1.03, 1.53), 0.28),
     Joint("snout", "brow", (0.0, -1.26, 1.43), 0.16),
     Joint("nose", "snout", (0.0, -1.40, 1.41), 0.13),
-    Joint("ear.L", "skull", (0.18, -0.80, 1.75), 0.085),
+    Joint("ear.L", "skull", (0.22, -0.80, 1.78), 0.085),
     Joint("ear_mid.L", "ear.L", (0.27, -0.76, 1.89), 0.11),
     Joint("ear_tip.L", "ear_mid.L", (0.36, -0.70, 2.06), 0.03),
-    Joint("shoulder.L", "chest", (0.22, -0.44, 0.56), 0.125),
+    Joint("shoulder.L", "chest", (0.22, -0.44, 0.54), 0.125),
     Joint("elbow.L", "shoulder.L", (0.23, -0.41, 0.37), 0.105),
     Joint("wrist.L", "elbow.L", (0.23, -0.42, 0.18), 0.09),
     Joint("ball.L", "wrist.L", (0.23, -0.50, 0.085), 0.085),
     Joint("paw.L", "ball.L", (0.23, -0.60, 0.085), 0.1),
-    Joint("hip.L", "pelvis", (0.22, 0.58, 0.56), 0.125),
+    Joint("hip.L", "pelvis", (0.22, 0.58, 0.54), 0.125),
     Joint("knee.L", "hip.L", (0.23, 0.55, 0.37), 0.115),
     Joint("ankle.L", "knee.L", (0.23, 0.58, 0.18), 0.09),
     Joint("heel.L", "ankle.L", (0.23, 0.50, 0.085), 0.085),
@@ -128,7 +128,7 @@ class Ring(NamedTuple):
 def build_creature(scene: bpy.types.Scene) -> bpy.types.Object:
     """Build an animated creature in `scene` and return its mesh object.
 
-    The mesh is one closed surface of 7176 quads, 0.8 m wide, 3.5 m long and 2.1 m high. Its parent is an
+    The mesh is one closed surface of 6632 quads, 0.8 m wide, 3.5 m long and 2.1 m high. Its parent is an
     armature whose action loops from ``FIRST_FRAME`` to ``LAST_FRAME``. The scene's frame range, selection and
     active object stay as they are.
     """

@@ -96,6 +96,10 @@ def _take_back(mesh: bpy.types.Mesh, note: dict[str, Any]) -> None:
         attribute = mesh.attributes.get(note.get(key, ""))
         if attribute is not None:
             mesh.attributes.remove(attribute)
+    # In 5.2 their names outlive the attribute that was active.
+    for kind in ("active_color_name", "default_color_name"):
+        if "colors" in note and getattr(mesh.attributes, kind) == note["colors"]:
+            setattr(mesh.attributes, kind, "")
     active = mesh.color_attributes.get(note.get("active_color", ""))
     if active is not None:
         mesh.color_attributes.active_color = active

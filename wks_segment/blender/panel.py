@@ -38,12 +38,11 @@ class _Sidebar:
     def segments(self, context: bpy.types.Context) -> None:
         """Show the number of segments, grey where it is found."""
         settings = context.scene.wks_segment
-        row = self.layout.row(align=True)
-        number = row.row(align=True)
-        number.use_property_split, number.use_property_decorate = True, False
+        column = self.layout.column()
+        number = column.column()
         number.enabled = not settings.auto_segments
         number.prop(settings, "n_segments")
-        row.prop(settings, "auto_segments", toggle=True)
+        column.prop(settings, "auto_segments")
 
     def live(self, context: bpy.types.Context) -> None:
         """Show whether labels follow the settings, and if not, why, and how they can."""
@@ -73,6 +72,8 @@ class _Sidebar:
         """Show how far the running job is, or why the last one was ended."""
         desk = desk_of(context)
         stage, left = desk.job.lines if desk.job is not None else (desk.said, "")
+        if not stage:
+            return
         column = self.layout.column(align=True)
         for line in wrapped(stage):
             column.label(text=line)
@@ -180,8 +181,8 @@ class WKS_SEGMENT_PT_advanced(SubPanel, bpy.types.Panel):
 
 
 def wrapped(text: str) -> list[str]:
-    """Lines that the sidebar has room for; what is a pair of numbers stays together."""
-    joined = re.sub(r"(?<=\d) (?=\d)", "\N{NO-BREAK SPACE}", text)
+    """Lines that the sidebar has room for; what is a pair of numbers stays together, as "3 of 5" does."""
+    joined = re.sub(r"(?<=\d) (?=\d|of \d)|(?<=\d of) (?=\d)", "\N{NO-BREAK SPACE}", text)
     return [short for line in joined.splitlines() for short in wrap(line, WIDTH)]
 
 

@@ -1,0 +1,73 @@
+"""Makes the pictures of the docs that show Blender's window: `make screenshots`, into `docs/images`.
+
+Opens a real Blender with the extension as it is now, and does with mouse and keyboard what the docs tell.
+`tests/window` says how, and what it needs; WKS_SEGMENT_WINDOW names the folder where Blender is or gets installed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import tempfile
+from pathlib import Path
+
+from tests.window.driver import SUITES, RealBlender, build_zip
+
+IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
+BODY = "Creature"
+SUBPANELS = {"outputs": "write_materials", "model": "wks_segment.save_model", "advanced": "snap_to"}
+"""What to look for in them."""
+BELOW = 70
+"""Pixels that are shown below the last button: titles of closed sub-panels."""
+
+
+def main() -> None:
+    """Take all pictures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--blender", choices=SUITES, default="5.2")
+    parser.add_argument("--output", type=Path, default=IMAGES)
+    options = parser.parse_args()
+    folder = Path(os.environ.get("WKS_SEGMENT_WINDOW", "window"))
+    with tempfile.TemporaryDirectory() as temporary, RealBlender(options.blender, folder) as blender:
+        blender.install_extension(build_zip(Path(temporary)))
+        blender.start(blender.make_scene("creature", "creature.blend"), beautiful=True)
+        blender.ask("zoom_to_all")
+        take(blender, options.output)
+
+
+def take(blender: RealBlender, folder: Path) -> None:
+    """The way of the first minute, a picture at each stop."""
+    blender.select(BODY)
+    blender.open_sidebar()
+    blender.over_viewport()
+    viewport(blender, folder / "window_before.png")
+    blender.press("wks_segment.learn")
+    blender.wait_for("segments", BODY)
+    blender.over_viewport()
+    viewport(blender, folder / "panel.png")
+    for name, inside in {
+        "outputs": "write_materials",
+        "model": "wks_segment.save_model",
+        "advanced": "snap_to",
+    }.items():
+        blender.find(inside)  # opens its sub-panel
+        panel(blender, folder / f"panel_{name}.png")
+
+
+def viewport(blender: RealBlender, path: Path) -> None:
+    """Save the 3D viewport with its side panel."""
+    x, y, width, height = blender.ask("region", "WINDOW")
+    blender.settle()
+    blender.screenshot(path, (x, y, width, height))
+
+
+def panel(blender: RealBlender, path: Path) -> None:
+    """Save the side panel down to where it ends."""
+    x, y, width, height = blender.ask("region", "UI")
+    last = max(place[1] for place in blender.ask("button", "none of these").values())
+    blender.over_viewport()
+    blender.screenshot(path, (x, y, width, min(height, last - y + BELOW)))
+
+
+if __name__ == "__main__":
+    main()
