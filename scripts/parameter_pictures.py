@@ -106,7 +106,7 @@ SHEETS = {
     "segments": Sheet(creature, {f"{count} segments": {"n_segments": count} for count in (4, 8, 12)}),
     "sides": Sheet(creature, {"One Part for Both": {}, "Left and Right": {"sides": "two"}}),
     "smoothness": Sheet(creature, {f"Smoothness {value}": {"smoothness": value} for value in (0, 1, 3)}),
-    "smallest_part": Sheet(creature, {f"Smallest Part {share} %": {"min_share": share} for share in (0, 0.5, 6)}),
+    "smallest_part": Sheet(creature, {f"Smallest Part {share} %": {"min_share": share} for share in (0.5, 2, 6)}),
     "eigenpairs": Sheet(creature, {f"{count} eigenpairs": {"n_eigenpairs": count} for count in (30, 100, 300)}),
     "method": Sheet(creature, {"Robust": {}, "As in the Paper": {"preset": "paper"}}),
     "loose_parts": Sheet(
