@@ -36,8 +36,8 @@ from wks_segment.core.mesh import IntArray
 
 WIDTH = 340
 """Of a tile, in pixels."""
-SHADES = 128
-"""Different colors in a picture: enough for the eye, and a third of the bytes."""
+SHADES = 256
+"""Different colors in a picture: enough for the eye, and a tenth of the bytes."""
 LEARNED_BY = ("n_segments", "n_eigenpairs", "preset", "pieces")
 """Settings that another model is learned for; the others act when a model is applied."""
 FRAME = 8
@@ -149,7 +149,8 @@ def draw(sheet: Sheet, path: Path, models: dict[Any, str]) -> None:
     render_poses(tiles, path)
     with Image.open(path) as picture:
         small = picture.convert("RGB").resize((WIDTH * len(tiles), WIDTH), Image.Resampling.LANCZOS)
-    small.quantize(SHADES, dither=Image.Dither.NONE).save(path, optimize=True)
+    few = small.quantize(SHADES, Image.Quantize.FASTOCTREE, kmeans=2, dither=Image.Dither.NONE)
+    few.save(path, optimize=True)
 
 
 def labelled(character: Character, changes: dict[str, Any], known: tuple[Any, dict[Any, str]]) -> IntArray:

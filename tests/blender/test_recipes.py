@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import bpy
 import pytest
-from builders import limbed, limbed_rigged
+from builders import limbed, rig
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "recipes.md"
@@ -50,14 +50,14 @@ def kitchen(extension, tmp_path_factory):
     python.write_text(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')
     python.chmod(0o755)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    limbed_rigged()
+    rig([limbed("Walker", subdivisions=3)])
     bpy.ops.export_scene.gltf(filepath=str(folder / "walk.glb"))
     for name in ("knight", "thief"):
         shutil.copy(folder / "walk.glb", folder / "characters" / f"{name}.glb")
     (folder / "characters" / "broken.glb").write_text("no glTF")
     for i, bend in enumerate(BENDS, start=1):
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-        limbed(f"Pose {i}", bend)
+        limbed(f"Pose {i}", bend, subdivisions=3)
         bpy.ops.wm.obj_export(filepath=str(folder / f"pose_{i}.obj"))
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     return folder
