@@ -1,7 +1,7 @@
 """The pictures of docs/parameters.md, made by the software itself: what each setting does to the same pose.
 
-    python scripts/parameter_pictures.py                        # all of them, into docs/images; some minutes
-    python scripts/parameter_pictures.py smoothness loose_parts # these
+    python -m scripts.parameter_pictures                         # all of them, into docs/images; some minutes
+    python -m scripts.parameter_pictures smoothness loose_parts  # these
 
 Learns through the operators, as an artist does. Needs bpy and Pillow (`make` installs both into .venv).
 """
@@ -11,16 +11,10 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-import tempfile
 import traceback
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
-
-ROOT = Path(__file__).resolve().parent.parent
-FOLDER = ROOT / "docs" / "images"
-os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="wks_segment_pictures_")
-sys.path.insert(0, str(ROOT))
 
 import bpy
 import numpy as np
@@ -34,6 +28,7 @@ from wks_segment.blender.labels import FACES
 from wks_segment.blender.picture import Tile, render_poses
 from wks_segment.core.mesh import IntArray
 
+FOLDER = Path(__file__).resolve().parent.parent / "docs" / "images"
 WIDTH = 340
 """Of a tile, in pixels."""
 SHADES = 256
@@ -44,6 +39,7 @@ FRAME = 8
 """The frame of the creature that is shown."""
 BEND = 0.6
 """How far the robot bends its limbs in its second pose, in radians."""
+Place = tuple[float, float, float]
 
 
 class Sheet(NamedTuple):
@@ -64,14 +60,14 @@ def creature() -> Character:
 
 def robot() -> Character:
     """A robot of blocks that touch nowhere, whose eight parts of limbs are one and the same block."""
-    blocks = [  # middle, size, joint of what bends
+    blocks: list[tuple[Place, Place, Place | None]] = [  # middle, size, joint of what bends
         ((0.0, 0.0, 1.35), (0.56, 0.34, 0.7), None),
         ((0.0, 0.0, 1.92), (0.34, 0.34, 0.34), None),
     ]
     for side in (-1, 1):
         for x, top in ((0.42, 1.66), (0.16, 0.96)):
-            joint = (side * x, 0.0, top)
-            blocks += [((side * x, 0.0, top - below), (0.18, 0.2, 0.34), joint) for below in (0.2, 0.6)]
+            end = (side * x, 0.0, top)
+            blocks += [((side * x, 0.0, top - below), (0.18, 0.2, 0.34), end) for below in (0.2, 0.6)]
     vertices: list[Vector] = []
     bent: list[Vector] = []
     faces: list[list[int]] = []
