@@ -33,7 +33,7 @@ zip: $(VENV)/.ready  ## the extension for each platform, in dist/ (PLATFORM=linu
 	$(RUN) scripts/build_zip.py $(if $(PLATFORM),--platform $(PLATFORM))
 
 docs: $(DOCS)/.ready  ## the site of docs/, in site/; fails on a dead link
-	$(DOCS)/bin/python -m mkdocs build --strict --quiet
+	$(DOCS)/bin/python -m mkdocs build --strict
 
 clean:  ## remove the environments and all that was built
 	rm -rf $(VENV) $(OLDEST) $(DOCS) dist wheels demo site
