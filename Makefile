@@ -2,12 +2,13 @@
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 OLDEST := .venv-oldest
+DOCS := .venv-docs
 RUN := $(VENV)/bin/python
 PLATFORM ?=
 SEGMENTS ?= 6
 BLENDERS ?= window
 
-.PHONY: help demo test test-oldest test-window screenshots fuzz lint zip clean
+.PHONY: help demo test test-oldest test-window screenshots fuzz lint zip docs clean
 
 help:  ## list the commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
@@ -38,8 +39,11 @@ lint: $(VENV)/.ready  ## ruff and mypy
 zip: $(VENV)/.ready  ## the extension for each platform, in dist/ (PLATFORM=linux-x64: for one)
 	$(RUN) scripts/build_zip.py $(if $(PLATFORM),--platform $(PLATFORM))
 
+docs: $(DOCS)/.ready  ## the site of docs/, in site/; fails on a dead link
+	$(DOCS)/bin/python -m mkdocs build --strict
+
 clean:  ## remove the environments and all that was built
-	rm -rf $(VENV) $(OLDEST) dist wheels demo
+	rm -rf $(VENV) $(OLDEST) $(DOCS) dist wheels demo site
 
 $(VENV)/.ready: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || \
@@ -51,4 +55,9 @@ $(VENV)/.ready: pyproject.toml
 $(OLDEST)/.ready: pyproject.toml
 	$(PYTHON) -m venv $(OLDEST)
 	$(OLDEST)/bin/python -m pip install --quiet --disable-pip-version-check --editable ".[oldest]"
+	touch $@
+
+$(DOCS)/.ready: pyproject.toml
+	$(PYTHON) -m venv $(DOCS)
+	$(DOCS)/bin/python -m pip install --quiet --disable-pip-version-check --editable ".[docs]"
 	touch $@

@@ -1,0 +1,186 @@
+"""The pictures of docs/parameters.md, made by the software itself: what each setting does to the same pose.
+
+    python -m scripts.parameter_pictures                         # all of them, into docs/images; some minutes
+    python -m scripts.parameter_pictures smoothness loose_parts  # these
+
+Learns through the operators, as an artist does. Needs bpy and Pillow (`make` installs both into .venv).
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+from PIL import Image
+
+import wks_segment.blender
+from wks_segment.blender import demo, poses
+from wks_segment.blender.characters import Character
+from wks_segment.blender.labels import FACES
+from wks_segment.blender.picture import Tile, render_poses
+from wks_segment.core.mesh import IntArray
+
+FOLDER = Path(__file__).resolve().parent.parent / "docs" / "images"
+WIDTH = 340
+"""Of a tile, in pixels."""
+SHADES = 256
+"""Different colors in a picture: enough for the eye, and a tenth of the bytes."""
+LEARNED_BY = ("n_segments", "n_eigenpairs", "preset", "pieces")
+"""Settings that another model is learned for; the others act when a model is applied."""
+FRAME = 8
+"""The frame of the creature that is shown."""
+BEND = 0.6
+"""How far the robot bends its limbs in its second pose, in radians."""
+Place = tuple[float, float, float]
+
+
+class Sheet(NamedTuple):
+    """Tiles side by side: what is written below each, and its settings."""
+
+    character: Callable[[], Character]
+    tiles: dict[str, dict[str, Any]]
+
+
+def creature() -> Character:
+    """The creature of the demo."""
+    character = demo.creature(bpy.context)
+    settings = bpy.context.scene.wks_segment
+    settings.source, settings.pose_count = "FRAMES", 4
+    bpy.context.scene.frame_set(FRAME)
+    return character
+
+
+def robot() -> Character:
+    """A robot of blocks that touch nowhere, whose eight parts of limbs are one and the same block."""
+    blocks: list[tuple[Place, Place, Place | None]] = [  # middle, size, joint of what bends
+        ((0.0, 0.0, 1.35), (0.56, 0.34, 0.7), None),
+        ((0.0, 0.0, 1.92), (0.34, 0.34, 0.34), None),
+    ]
+    for side in (-1, 1):
+        for x, top in ((0.42, 1.66), (0.16, 0.96)):
+            end = (side * x, 0.0, top)
+            blocks += [((side * x, 0.0, top - below), (0.18, 0.2, 0.34), end) for below in (0.2, 0.6)]
+    vertices: list[Vector] = []
+    bent: list[Vector] = []
+    faces: list[list[int]] = []
+    for i, (middle, size, joint) in enumerate(blocks):
+        bpy.ops.mesh.primitive_cube_add(size=1.0)
+        block = bpy.context.active_object
+        rounded = block.modifiers.new("Bevel", "BEVEL")
+        rounded.width, rounded.segments = 0.12, 2
+        block.modifiers.new("Subdivision", "SUBSURF").levels = 1
+        mesh = bpy.data.meshes.new_from_object(block.evaluated_get(bpy.context.evaluated_depsgraph_get()))
+        bpy.data.objects.remove(block)
+        place = Matrix.Translation(middle) @ Matrix.Diagonal((*size, 1.0))
+        turn = Matrix()
+        if joint is not None:
+            turn = Matrix.Translation(joint) @ Matrix.Rotation(BEND * (-1) ** (i // 2), 4, "X")
+            turn = turn @ Matrix.Translation(-Vector(joint))
+        faces += [[corner + len(vertices) for corner in polygon.vertices] for polygon in mesh.polygons]
+        own = [place @ vertex.co for vertex in mesh.vertices]
+        vertices += own
+        bent += [turn @ vertex for vertex in own]
+    whole = bpy.data.meshes.new("Robot")
+    whole.from_pydata(vertices, [], faces)
+    obj = bpy.data.objects.new("Robot", whole)
+    bpy.context.scene.collection.objects.link(obj)
+    obj.shape_key_add(name="Basis")
+    obj.shape_key_add(name="Walk").data.foreach_set("co", np.array(bent, dtype=np.float32).ravel())
+    bpy.context.scene.wks_segment.source = "SHAPE_KEYS"
+    return Character((obj,))
+
+
+SHEETS = {
+    "segments": Sheet(creature, {f"{count} segments": {"n_segments": count} for count in (4, 8, 12)}),
+    "sides": Sheet(creature, {"One Part for Both": {}, "Left and Right": {"sides": "two"}}),
+    "smoothness": Sheet(creature, {f"Smoothness {value}": {"smoothness": value} for value in (0, 1, 3)}),
+    "smallest_part": Sheet(creature, {f"Smallest Part {share} %": {"min_share": share} for share in (0.5, 2, 6)}),
+    "eigenpairs": Sheet(creature, {f"{count} eigenpairs": {"n_eigenpairs": count} for count in (30, 100, 300)}),
+    "method": Sheet(creature, {"Robust": {}, "As in the Paper": {"preset": "paper"}}),
+    "loose_parts": Sheet(
+        robot,
+        {
+            "By the Whole Character": {"n_segments": 4},
+            "Each on Its Own": {"n_segments": 4, "pieces": "separate"},
+        },
+    ),
+}
+
+
+def main() -> None:
+    """Make the pictures that are asked for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(SHEETS)}; none: all")
+    parser.add_argument("--folder", type=Path, default=FOLDER)
+    options = parser.parse_args()
+    if unknown := set(options.names) - set(SHEETS):
+        parser.error(f"there is no picture {', '.join(sorted(unknown))}")
+    models: dict[Any, str] = {}
+    for name in options.names or SHEETS:
+        path = options.folder / f"parameter_{name}.png"
+        draw(SHEETS[name], path, models)
+        print(f"{path}: {path.stat().st_size / 1000:.0f} kB", flush=True)
+
+
+def draw(sheet: Sheet, path: Path, models: dict[Any, str]) -> None:
+    """Learn what is not among the models yet, apply, and write the picture."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    character = sheet.character()
+    for obj in character.objects:
+        obj.select_set(True)
+        bpy.context.view_layer.objects.active = obj
+    (pose,) = poses.read_objects(bpy.context, [character])
+    tiles = [
+        Tile(pose, labelled(character, changes, (sheet.character, models)), text)
+        for text, changes in sheet.tiles.items()
+    ]
+    render_poses(tiles, path)
+    with Image.open(path) as picture:
+        small = picture.convert("RGB").resize((WIDTH * len(tiles), WIDTH), Image.Resampling.LANCZOS)
+    few = small.quantize(SHADES, Image.Quantize.FASTOCTREE, kmeans=2, dither=Image.Dither.NONE)
+    few.save(path, optimize=True)
+
+
+def labelled(character: Character, changes: dict[str, Any], known: tuple[Any, dict[Any, str]]) -> IntArray:
+    """(p,) part of each polygon by the default settings with these changes."""
+    settings, (kind, models) = bpy.context.scene.wks_segment, known
+    for name in {name for sheet in SHEETS.values() for of in sheet.tiles.values() for name in of}:
+        settings.property_unset(name)
+    for name, value in changes.items():
+        setattr(settings, name, value)
+    key = (kind, *(getattr(settings, name) for name in LEARNED_BY))
+    if key not in models:
+        bpy.ops.wks_segment.learn()
+        models[key] = settings.model
+    settings.model = models[key]
+    bpy.ops.wks_segment.apply()
+    found = []
+    for obj in character.objects:
+        labels = np.empty(len(obj.data.polygons), dtype=np.int32)
+        obj.data.attributes[FACES].data.foreach_get("value", labels)
+        found.append(labels.astype(np.int64))
+    return np.concatenate(found)
+
+
+if __name__ == "__main__":
+    wks_segment.blender.register()
+    code = 1
+    try:
+        main()
+        code = 0
+    except SystemExit as end:  # argparse
+        code = int(end.code or 0)
+    except BaseException:
+        traceback.print_exc()
+    wks_segment.blender.unregister()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)  # some versions of bpy crash or hang at a normal exit
