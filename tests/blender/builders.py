@@ -265,7 +265,7 @@ def scene_snapshot():
     return {
         "meshes": {mesh.name: snapshot(mesh) for mesh in bpy.data.meshes},
         "objects": {obj.name: object_snapshot(obj) for obj in bpy.data.objects},
-        "images": {image.name: image_snapshot(image) for image in bpy.data.images},
+        "images": {image.name: image_snapshot(image) for image in bpy.data.images if image.type != "RENDER_RESULT"},
         "engine": context.scene.render.engine,
         "tools": (tools.use_uv_select_sync, tuple(tools.mesh_select_mode)),
         "materials": sorted(material.name for material in bpy.data.materials),
