@@ -617,6 +617,17 @@ def test_sides_can_be_chosen_in_the_panel(settings):
     assert (settings, "sides") in [call.args for call in shown]
 
 
+@pytest.mark.parametrize("materials", [False, True])
+def test_outputs_can_be_chosen_in_the_panel(settings, materials):
+    settings.write_materials = materials
+    shown = [call.args[1] for call in drawn(panel.WKS_SEGMENT_PT_outputs).column.return_value.prop.call_args_list]
+    assert {"palette", "write_colors", "vertex_groups", "write_face_sets", "write_seams"} < set(shown)
+    assert ("material_template" in shown) is materials
+    buttons = drawn(panel.WKS_SEGMENT_PT_outputs).column.return_value.operator.call_args_list
+    assert {call.args[0] for call in buttons} == {f"wks_segment.{name}" for name in ("unwrap", "separate", "transfer")}
+    drawn(panel.WKS_SEGMENT_PT_bake).operator.assert_called_once_with("wks_segment.bake", icon="RENDER_STILL")
+
+
 def test_panel_breaks_long_lines_and_keeps_pairs_together(settings):
     settings.model_summary = "From Fox\nCertainty by segments: " + " · ".join(f"{i} 0.91" for i in range(2, 17))
     labels = drawn(panel.WKS_SEGMENT_PT_model).column.return_value.label.call_args_list

@@ -139,7 +139,6 @@ class WKS_SEGMENT_PT_bake(SubPanel, bpy.types.Panel):
     """The ID map."""
 
     bl_label = "ID Map"
-    bl_parent_id = "WKS_SEGMENT_PT_outputs"
 
     def draw(self, context: bpy.types.Context) -> None:
         self.settings(context, "bake_size", "bake_margin", "bake_unwrap")
