@@ -67,6 +67,7 @@ def scene(extension):
     import bpy
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    extension.session.session_of(bpy.context).cache.clear()
     settings = bpy.context.scene.wks_segment
     settings.source = "OBJECTS"
     settings.n_segments, settings.n_eigenpairs, settings.n_energies = 4, 30, 40
