@@ -23,7 +23,6 @@ from builders import (
 from wks_segment.blender import operators, panel
 from wks_segment.blender import poses as reader
 from wks_segment.blender.poses import Character
-from wks_segment.blender.session import session_of
 from wks_segment.core import PoseSegmentation, hierarchy, spectrum
 
 pytestmark = pytest.mark.usefixtures("scene")
@@ -156,8 +155,6 @@ def test_a_fallback_of_the_solver_reaches_the_user(settings, printed, monkeypatc
     monkeypatch.setattr(spectrum, "hierarchical_eigenpairs", refuse)
     monkeypatch.setattr(spectrum, "DENSE_BELOW", 0)
     select(*limbed_poses(*BENDS))
-    # Other tests learn from the same surfaces.
-    session_of(bpy.context).cache.clear()
     printed()
     assert OPS.learn() == {"FINISHED"}
     assert printed().out.count("Warning: the fast eigensolver did not converge on this mesh") == 1
