@@ -19,7 +19,8 @@ def pytest_addoption(parser):
 
 def pytest_generate_tests(metafunc):
     if "blender" in metafunc.fixturenames:
-        versions = metafunc.config.getoption("blender") or list(SUITES)
+        # Where the folder was not named on the command line, neither is its option.
+        versions = metafunc.config.getoption("blender", default=None) or list(SUITES)
         metafunc.parametrize("blender", versions, indirect=True, scope="session")
 
 
