@@ -508,8 +508,8 @@ def test_undo_gives_back_the_groups(settings, rigged):
 def test_a_refused_run_leaves_the_groups(settings):
     obj = limbed()
     learned(settings, "soft", obj)
-    before, groups = scene_snapshot(), groups_of(obj)
     obj.modifiers.new("Remesh", "REMESH")
+    before, groups = scene_snapshot(), groups_of(obj)
     with pytest.raises(RuntimeError, match="modifier"):
         OPS.learn()
     assert not changes(before, scene_snapshot())
