@@ -26,7 +26,7 @@ def creature(settings, monkeypatch):
     """The creature of the demo, coarse, its walk to be learned from with two sides."""
     monkeypatch.setattr(builder, "SUBDIVISIONS", 1)
     obj = builder.build_creature(bpy.context.scene)
-    settings.source, settings.pose_count, settings.sides = "FRAMES", 2, "two"
+    settings.source, settings.pose_count, settings.sides = "FRAMES", 4, "two"
     settings.n_segments, settings.n_eigenpairs, settings.n_energies = 5, 60, 40
     select(obj)
     return obj
@@ -139,7 +139,7 @@ def test_left_is_what_is_seen_on_the_left_of_an_object_without_a_rig(creature, s
         for group in creature.vertex_groups:
             statue.vertex_groups.new(name=group.name)
         statues.append(statue)
-    settings.source = "OBJECTS"
+    settings.source, settings.n_eigenpairs = "OBJECTS", 150
     select(*statues)
     OPS.learn()
     assert all(sides_are_right(statue, left, 3 - left) for statue in statues)
@@ -353,7 +353,7 @@ def opened(path):
 
 def test_segment_and_apply_tell_left_from_right(command, file, tmp_path):
     output, model = tmp_path / "out.blend", tmp_path / "model.json"
-    segment = ("segment", file, "--frames", 2, *QUICK, "--model", model, "--output", output)
+    segment = ("segment", file, "--frames", 4, *QUICK, "--model", model, "--output", output)
     done = command(*segment, "--sides", "two", "--materials", "--json")
     assert done.code == 0, done
     found = done.result["parts"]
@@ -364,7 +364,7 @@ def test_segment_and_apply_tell_left_from_right(command, file, tmp_path):
     assert [material.name for material in obj.data.materials] == list(found)
     assert sorted(found.values()) == np.unique(labels_of(obj)).tolist()
 
-    done = command("apply", file, "--frames", 2, "--model", model, "--output", output, "--sides", "two")
+    done = command("apply", file, "--frames", 4, "--model", model, "--output", output, "--sides", "two")
     assert "5 segments in 10 parts" in done.out
     assert sides_are_right(opened(output))
 
@@ -374,7 +374,7 @@ def test_segment_and_apply_tell_left_from_right(command, file, tmp_path):
 
 def test_the_method_of_the_paper_is_warned_of(command, file, tmp_path):
     options = ("--preset", "paper", "--sides", "two", "--output", tmp_path / "out.blend", "--json")
-    done = command("segment", file, "--frames", 2, *QUICK, *options)
+    done = command("segment", file, "--frames", 4, *QUICK, *options)
     assert done.code == 0, done
     assert done.result["warnings"] == [NOT_IN_PAPER]
     assert len(done.result["parts"]) == done.result["segments"]

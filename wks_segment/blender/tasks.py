@@ -206,7 +206,7 @@ def label(
     if wanted.sides == "two" and len(report.parts) == report.n_segments:
         report.warn(
             "Left and right are not told apart with the method of the paper: parts are one for both sides"
-            if model.regions_ is None
+            if model.sides_ is None
             else "No segment has parts on both sides: does X point to the character's left when it is at rest?"
         )
     return labels

@@ -16,7 +16,7 @@ from .part_notes import PartNotes
 from .region_atlas import FIELDS, PLANES
 
 FORMAT = "wks_segment model"
-VERSION = 2
+VERSION = 3
 PARAMETERS = (
     "n_segments", "covariance_type", "n_eigenpairs", "n_energies", "accuracy", "random_state", "scaling",
     "pieces", "laplacian", "smoothness", "preset",
@@ -27,6 +27,8 @@ LEAST, MOST = 1e-6, 1e6
 """Sizes of numbers in a model: spreads lie between them, their squares bound variances. Beyond, single precision would
 lose a signature's digits, or overflow."""
 MOST_COMPONENTS, MOST_REGIONS = 1100, 400
+KINDS = ("region", "sided")
+"""Of regions: wholes, and segments by which left and right are told."""
 MAX_BYTES = 20 * 2**20
 """A file above this is not read, nor written: what is in there could take longer than a second. 64 segments with
 diagonal covariances take 300 kB, 8 with full ones 2 MB."""
@@ -74,15 +76,14 @@ def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], Covariance
     k, d = _n_components(content, parameters["n_segments"]), parameters["n_energies"]
     grouped: dict[str, tuple[int, ...]] = {}
     if parameters["preset"] != "paper":
-        r = _length(content, "region_segment", MOST_REGIONS)
         grouped = {"joins": (k - 1, 2), "certainties": (k,), "by_chance": (k,), "cuts": (k,)}
-        grouped |= {"region_segment": (r,), "region_side": (r,), "region_area": (r,), "region_distance": (r, r)}
-        grouped |= {
-            "region_signature": (r, FIELDS),
-            "region_handedness": (r, PLANES),
-            "region_groups": (),
-            "region_noise": (4,),
-        }
+        for kind in KINDS:
+            r = _length(content, f"{kind}_segment", MOST_REGIONS)
+            of_regions = {
+                "segment": (r,), "side": (r,), "area": (r,), "distance": (r, r), "signature": (r, FIELDS),
+                "handedness": (r, PLANES), "groups": (), "noise": (4,),
+            }  # fmt: skip
+            grouped |= {f"{kind}_{name}": shape for name, shape in of_regions.items()}
     shapes = {"shared": (d,), "diag": (k, d), "spherical": (k,), "tied": (d, d), "full": (k, d, d)}
     if covariance_type not in get_args(CovarianceType):
         raise ModelFileError(f"the model is damaged: unknown covariance type {covariance_type!r}")
@@ -95,7 +96,8 @@ def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], Covariance
     }  # fmt: skip
     if grouped:
         _check_joins(arrays["joins"], k)
-        _check_regions(arrays, k)
+        for kind in KINDS:
+            _check_regions(arrays, kind, k)
     for name, array in arrays.items():
         if np.abs(array).max(initial=0) > (MOST**2 if name == "covariances" else MOST):
             raise ModelFileError(f"the model is damaged: {name} has a number of {np.abs(array).max():.3g}, too large")
@@ -143,17 +145,17 @@ def _check_joins(joins: FloatArray, n_components: int) -> None:
         alive.remove(j)
 
 
-def _check_regions(arrays: dict[str, FloatArray], n_components: int) -> None:
+def _check_regions(arrays: dict[str, FloatArray], kind: str, n_components: int) -> None:
     """Regions belong to groups that are there, have an area, and are left, right or neither."""
-    groups, segment = arrays["region_groups"], arrays["region_segment"]
+    groups, segment = arrays[f"{kind}_groups"], arrays[f"{kind}_segment"]
     if not (1 <= groups <= n_components and groups % 1 == 0):
-        raise ModelFileError(f"the model is damaged: region_groups is {groups:g}, not a number of groups")
+        raise ModelFileError(f"the model is damaged: {kind}_groups is {groups:g}, not a number of groups")
     if not (len(segment) and (segment % 1 == 0).all() and (segment >= 0).all() and (segment < groups).all()):
-        raise ModelFileError(f"the model is damaged: region_segment has a number that is none of {groups:g} groups")
-    if not np.isin(arrays["region_side"], (-1, 0, 1)).all():
-        raise ModelFileError("the model is damaged: region_side has a number that is not -1, 0 or 1")
-    if not ((arrays["region_area"] > 0).all() and (arrays["region_noise"] > 0).all()):
-        raise ModelFileError("the model is damaged: region_area or region_noise is not positive")
+        raise ModelFileError(f"the model is damaged: {kind}_segment has a number that is none of {groups:g} groups")
+    if not np.isin(arrays[f"{kind}_side"], (-1, 0, 1)).all():
+        raise ModelFileError(f"the model is damaged: {kind}_side has a number that is not -1, 0 or 1")
+    if not ((arrays[f"{kind}_area"] > 0).all() and (arrays[f"{kind}_noise"] > 0).all()):
+        raise ModelFileError(f"the model is damaged: {kind}_area or {kind}_noise is not positive")
 
 
 def write(path: str | PathLike[str], text: str) -> None:

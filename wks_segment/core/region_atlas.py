@@ -48,6 +48,8 @@ ALIKE = 0.5
 """Parts on two sides are one part twice if the smaller has at least this share of the larger one's area."""
 MIDDLE = 0.05
 """Regions nearer than this to each other, across the mirror plane, are neither left nor right."""
+BENT = 0.1
+"""The same where no mirroring brings the regions close to each other."""
 SIDE_REACH = 0.15
 """What `REACH` is, where a part's side is that of what is near to it."""
 SURE = 0.5
@@ -204,25 +206,25 @@ class RegionAtlas:
         """(r,) which region each is in the mirror image of the character; on from r for one that has none there."""
         return self.named(replace(self.traits, handedness=-self.traits.handedness))
 
-    def arrays(self) -> dict[str, FloatArray | IntArray]:
-        """What a file keeps; see `of_arrays`."""
-        of_traits = {f"region_{name}": getattr(self.traits, name) for name in Traits.__dataclass_fields__}
+    def arrays(self, kind: str) -> dict[str, FloatArray | IntArray]:
+        """What a file keeps, each name beginning with the kind of region; see `of_arrays`."""
+        of_traits = {f"{kind}_{name}": getattr(self.traits, name) for name in Traits.__dataclass_fields__}
         return {
-            "region_groups": np.array(self.n_groups),
-            "region_side": self.side,
-            "region_noise": self.noise,
+            f"{kind}_groups": np.array(self.n_groups),
+            f"{kind}_side": self.side,
+            f"{kind}_noise": self.noise,
             **of_traits,
         }
 
     @classmethod
-    def of_arrays(cls, arrays: Mapping[str, FloatArray]) -> RegionAtlas:
+    def of_arrays(cls, arrays: Mapping[str, FloatArray], kind: str) -> RegionAtlas:
         """From what `arrays` gave."""
-        segment, side = (arrays[f"region_{name}"].astype(np.int64) for name in ("segment", "side"))
+        segment, side = (arrays[f"{kind}_{name}"].astype(np.int64) for name in ("segment", "side"))
         area, signature, handedness, distance = (
-            arrays[f"region_{name}"] for name in ("area", "signature", "handedness", "distance")
+            arrays[f"{kind}_{name}"] for name in ("area", "signature", "handedness", "distance")
         )
         traits = Traits(segment, area, signature, handedness, distance)
-        return cls(int(arrays["region_groups"]), traits, side, arrays["region_noise"])
+        return cls(int(arrays[f"{kind}_groups"]), traits, side, arrays[f"{kind}_noise"])
 
     def named(self, found: Traits) -> IntArray:
         """(r',) the atlas' region that each found one is; those that are none are numbered on from there.
@@ -302,13 +304,13 @@ def sides(centres: FloatArray, segment: IntArray, mirrored: IntArray) -> IntArra
     side = _told_apart(centres[:, 0], nearest) * across
     opposite = np.where(mirrored < len(segment), mirrored, np.arange(len(segment)))
     neither = (side == 0) & (side[opposite] == 0)
-    return np.where(neither, _told_apart(centres[:, 0], opposite), side)
+    return np.where(neither, _told_apart(centres[:, 0], opposite, BENT), side)
 
 
-def _told_apart(x: FloatArray, opposite: IntArray) -> IntArray:
-    """(r,) 1 or −1 where a region is clearly further left or right than the opposite one, which is opposite to it."""
+def _told_apart(x: FloatArray, opposite: IntArray, least: float = MIDDLE) -> IntArray:
+    """(r,) 1 or −1 where a region is that much further left or right than the opposite one, which is opposite to it."""
     apart = x - x[opposite]
-    return np.where((opposite[opposite] == np.arange(len(x))) & (np.abs(apart) > MIDDLE), np.sign(apart), 0).astype(int)
+    return np.where((opposite[opposite] == np.arange(len(x))) & (np.abs(apart) > least), np.sign(apart), 0).astype(int)
 
 
 def side_field(surface: Surface, region: IntArray, side: IntArray, flows: Flows) -> FloatArray:

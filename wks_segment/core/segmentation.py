@@ -101,7 +101,9 @@ class PoseSegmentation(PoseDescriber):
     grouping_ : Grouping or None
         In which order components make segments; None with the paper's setting.
     regions_ : RegionAtlas or None
-        The connected regions of the learned poses, and which are left and right; None with the paper's setting.
+        The connected regions of the learned poses; None with the paper's setting.
+    sides_ : RegionAtlas or None
+        The same of the segments, which may be smaller than regions: by these left and right are told.
     n_segments_ : int
         Segments found.
     centre_, spread_ : (n_energies,) arrays
@@ -206,6 +208,7 @@ class PoseSegmentation(PoseDescriber):
         self.part_notes_ = PartNotes()
         self.grouping_: Grouping | None = None
         self.regions_: RegionAtlas | None = None
+        self.sides_: RegionAtlas | None = None
         if self.preset == "paper":
             (self.mixture_,) = fit_mixtures(samples, shares, wanted, covariance_type, self.random_state, 1, mixing)
         else:
@@ -213,7 +216,7 @@ class PoseSegmentation(PoseDescriber):
             mixtures = fine_mixtures(samples, shares, wanted, types, self.n_segments == "auto", mixing)
             candidates = Candidates(poses, mixtures, self._standardised, self._number)
             self.mixture_, self.grouping_ = candidates.best(grouping)
-            self.regions_ = self._atlas(works, rest, naming)
+            self._learn_regions(works, rest, naming)
         tick("done", 1.0)
         return self
 
@@ -274,7 +277,7 @@ class PoseSegmentation(PoseDescriber):
         work = self._work(mesh)
         if self.regions_ is None:
             return connected_regions(*self._clean([work], None, min_share))
-        return self._named_regions(work, min_share)
+        return self._named_regions(self.regions_, work, min_share)
 
     def segment_polygons(
         self,
@@ -339,12 +342,12 @@ class PoseSegmentation(PoseDescriber):
         others. All 0 with the paper's setting.
         """
         self._fitted()
-        work, atlas = self._work(pose), self.regions_
+        work, atlas = self._work(pose), self.sides_
         if atlas is None:
             return np.zeros(len(labels), dtype=np.int64)
 
         def field() -> FloatArray:
-            region = self._named_regions(work, None)
+            region = self._named_regions(atlas, work, None)
             known = np.zeros(int(region.max()) + 1, dtype=np.int64)
             known[: len(atlas.side)] = atlas.side[: len(known)]
             return side_field(work.surface, region, known, work.flows)
@@ -390,9 +393,8 @@ class PoseSegmentation(PoseDescriber):
         model = copy(self)
         model.n_segments = n_segments
         model._check_parameters()
-        assert model.regions_ is not None
-        if len(poses) and self.grouping_.number_of_wholes(model.n_segments_) != model.regions_.n_groups:
-            model.regions_ = model._atlas([self._work(pose) for pose in poses], rest, lambda share: None)
+        if len(poses):
+            model._learn_regions([self._work(pose) for pose in poses], rest, lambda share: None)
         return model
 
     def save(self, path: str | PathLike[str]) -> None:
@@ -430,8 +432,8 @@ class PoseSegmentation(PoseDescriber):
         if self.grouping_ is not None:
             arrays["joins"] = self.grouping_.pairs
             arrays |= {name: getattr(self.grouping_, name) for name in ("certainties", "by_chance", "cuts")}
-        if self.regions_ is not None:
-            arrays |= self.regions_.arrays()
+        if self.regions_ is not None and self.sides_ is not None:
+            arrays |= self.regions_.arrays("region") | self.sides_.arrays("sided")
         return model_file.encode(
             {name: getattr(self, name) for name in model_file.PARAMETERS},
             arrays,
@@ -450,11 +452,11 @@ class PoseSegmentation(PoseDescriber):
         except (ValueError, TypeError) as error:
             raise model_file.ModelFileError(f"the model has a bad parameter: {error}") from error
         model.centre_, model.spread_ = arrays["centre"], arrays["spread"]
-        model.grouping_ = model.regions_ = None
+        model.grouping_ = model.regions_ = model.sides_ = None
         if "joins" in arrays:
             joins = arrays["joins"].astype(np.int64)
             model.grouping_ = Grouping(joins, arrays["certainties"], arrays["by_chance"], arrays["cuts"])
-            model.regions_ = RegionAtlas.of_arrays(arrays)
+            model.regions_, model.sides_ = (RegionAtlas.of_arrays(arrays, kind) for kind in model_file.KINDS)
         model.mixture_ = GaussianMixture(covariance_type, arrays["weights"], arrays["means"], arrays["covariances"])
         return model
 
@@ -610,16 +612,33 @@ class PoseSegmentation(PoseDescriber):
         fields = self._standardised(pose.signature) @ axes
         return np.pad(fields, ((0, 0), (0, FIELDS - axes.shape[1])))
 
+    def _learn_regions(
+        self, works: Sequence[Workpiece], rest: TriangleMesh | None, tick: Callable[[float], None]
+    ) -> None:
+        """The connected regions of the learned poses: of wholes, and of the segments, if these are others.
+
+        What is whole may lie on both sides: forelegs and the chest between them.
+        """
+        assert self.grouping_ is not None
+        atlases = {atlas.n_groups: atlas for atlas in (self.regions_, self.sides_) if atlas is not None}
+        numbers = self.grouping_.number_of_wholes(self.n_segments_), self.n_segments_
+        new = sorted(set(numbers) - atlases.keys())
+        for i, n_groups in enumerate(new):
+
+            def of_atlas(share: float, begun: int = i) -> None:
+                tick((begun + share) / len(new))
+
+            atlases[n_groups] = self._atlas(n_groups, works, rest, of_atlas)
+        self.regions_, self.sides_ = (atlases[n_groups] for n_groups in numbers)
+
     @threadpool_limits.wrap(limits=1, user_api="blas")  # as above
     def _atlas(
-        self, works: Sequence[Workpiece], rest: TriangleMesh | None, tick: Callable[[float], None]
+        self, n_groups: int, works: Sequence[Workpiece], rest: TriangleMesh | None, tick: Callable[[float], None]
     ) -> RegionAtlas:
-        """The connected regions of the learned poses, and which are left and right."""
+        """The connected regions of so many groups on the learned poses, and which are left and right."""
         first = works[0].surface.original
         if rest is not None and not np.array_equal(rest.faces, first.faces):
             raise ValueError("rest has other faces than the first pose: pass the same mesh, in its rest position")
-        assert self.grouping_ is not None
-        n_groups = self.grouping_.number_of_wholes(self.n_segments_)
         together = [works] if of_one_mesh([work.pose for work in works]) else [[work] for work in works]
         found: list[Regions] = []
         traits: list[Traits] = []
@@ -638,10 +657,9 @@ class PoseSegmentation(PoseDescriber):
         centres = found[0].centres(first if rest is None else rest)
         return RegionAtlas.learned(n_groups, traits, centres, alike=len(found) == 1)
 
-    def _named_regions(self, work: Workpiece, min_share: float | None) -> IntArray:
+    def _named_regions(self, atlas: RegionAtlas, work: Workpiece, min_share: float | None) -> IntArray:
         """(m,) region of each face, numbered as in the atlas, and on from there."""
-        assert self.regions_ is not None
-        labels, neighbours = self._clean([work], None, min_share, n_groups=self.regions_.n_groups)
+        labels, neighbours = self._clean([work], None, min_share, n_groups=atlas.n_groups)
         regions = Regions.of(labels, neighbours, work.surface.original)
-        names = self.regions_.named(regions.traits(work.surface, self._fields(work.pose), work.flows))
-        return regions.numbered(names, len(self.regions_.side))
+        names = atlas.named(regions.traits(work.surface, self._fields(work.pose), work.flows))
+        return regions.numbered(names, len(atlas.side))
