@@ -21,7 +21,8 @@ def test_tutorial(window, shot):
 
     window.enter("n_segments", "5")
     window.press("wks_segment.learn")
-    window.wait_for("n_segments", BODY, 5)
+    window.wait_for("job_is_over")
+    assert len(window.ask("segments", BODY)) == 5
     shot("five segments")
 
     window.press("write_materials")
