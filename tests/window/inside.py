@@ -110,9 +110,9 @@ def state():
         "selected": sorted(obj.name for obj in layer.objects if obj.select_get(view_layer=layer)),
         "active": layer.objects.active.name if layer.objects.active else None,
         "settings": {
-            name: value if isinstance(value, int | float | str | bool) else sorted(value)
-            for name in set(settings.bl_rna.properties.keys()) - {"rna_type", "name", "model", "model_summary"}
-            if not hasattr(value := getattr(settings, name), "bl_rna") and not hasattr(value, "add")
+            each.identifier: sorted(value) if isinstance(value := getattr(settings, each.identifier), set) else value
+            for each in settings.bl_rna.properties
+            if each.type not in {"POINTER", "COLLECTION"} and not each.identifier.startswith(("model", "name"))
         },
         "model": bool(settings.model),
         "summary": settings.model_summary.splitlines(),
