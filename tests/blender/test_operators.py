@@ -605,9 +605,9 @@ def drawn(panel):
 @pytest.mark.parametrize("automatic", [False, True])
 def test_number_is_grey_where_it_is_automatic(settings, automatic):
     settings.auto_segments = automatic
-    row = drawn(panel.WKS_SEGMENT_PT_main).row.return_value
-    row.prop.assert_called_once_with(settings, "auto_segments", toggle=True)
-    number = row.row.return_value
+    column = drawn(panel.WKS_SEGMENT_PT_main).column.return_value
+    column.prop.assert_any_call(settings, "auto_segments")
+    number = column.column.return_value
     number.prop.assert_called_once_with(settings, "n_segments")
     assert number.enabled is not automatic
 
