@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from . import command, operators, panel, panel_segments, session
+from . import command, menu, operators, panel, panel_segments, presets, session
 from .jobs import HOLDER, Desk
 from .segment_item import WKSSegmentItem
 from .settings import WKSSegmentSettings
@@ -15,6 +15,8 @@ CLASSES = (
     WKSSegmentItem,
     WKSSegmentSettings,
     *operators.CLASSES,
+    *menu.CLASSES,
+    *presets.CLASSES,
     # Sub-panels stand in the order of their registration.
     panel.CLASSES[0],
     *panel_segments.CLASSES,
@@ -33,12 +35,14 @@ def register() -> None:
     bpy.types.Scene.wks_segment = bpy.props.PointerProperty(type=WKSSegmentSettings)
     setattr(bpy.types.WindowManager, HOLDER, Desk())
     setattr(bpy.types.WindowManager, session.HOLDER, session.Session())
+    bpy.types.VIEW3D_MT_object.append(menu.draw_in_object_menu)
     _commands.append(bpy.utils.register_cli_command(COMMAND, command.run))
 
 
 def unregister() -> None:
     """Called by Blender when the extension is disabled."""
     bpy.utils.unregister_cli_command(_commands.pop())
+    bpy.types.VIEW3D_MT_object.remove(menu.draw_in_object_menu)
     for holder in (session.HOLDER, HOLDER):
         getattr(bpy.types.WindowManager, holder).close()
         delattr(bpy.types.WindowManager, holder)

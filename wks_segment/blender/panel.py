@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 
 from .jobs import desk_of
+from .presets import WKS_SEGMENT_PT_presets
 from .session import LIVE_SECONDS, session_of
 
 NO_MODEL = "No model yet:\nselect a character,\nthen Learn and Segment"
@@ -88,6 +89,9 @@ class WKS_SEGMENT_PT_main(_Sidebar, bpy.types.Panel):
 
     bl_label = "WKS Segment"
     bl_idname = "WKS_SEGMENT_PT_main"
+
+    def draw_header_preset(self, context: bpy.types.Context) -> None:
+        WKS_SEGMENT_PT_presets.draw_panel_header(self.layout)
 
     def draw(self, context: bpy.types.Context) -> None:
         settings = self.settings(context, "source")

@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from .panel import SubPanel
+from .panel import SubPanel, wrapped
 
 PRESETS = {
     "Human": (
@@ -96,7 +96,9 @@ class WKS_SEGMENT_PT_segments(SubPanel, bpy.types.Panel):
         settings, layout = context.scene.wks_segment, self.layout
         if not settings.segments:
             row = layout.row()
-            row.label(text=EMPTY)
+            column = row.column()
+            for line in wrapped(EMPTY):
+                column.label(text=line)
             row.operator("wks_segment.refresh_segments", text="", icon="FILE_REFRESH", emboss=False)
             return
         row = layout.row()

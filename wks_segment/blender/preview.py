@@ -71,9 +71,9 @@ class Preview:
         """Whether there is one."""
         return self._handle is not None
 
-    def show(self, context: bpy.types.Context, labels: Mapping[Character, IntArray]) -> None:
+    def show(self, context: bpy.types.Context, labels: Mapping[Character, IntArray], style: Style) -> None:
         """Draw these labels from now on, on the characters as they are seen now; UserError if one cannot be read."""
-        self.places, self.colors = picture(context, labels)
+        self.places, self.colors = picture(context, labels, style)
         self._batch = None
         if self._handle is None:
             self._handle = bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW")

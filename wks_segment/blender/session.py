@@ -12,6 +12,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core import MemoryCache
+from .edits import merged
 from .errors import ChangedError, UserError
 from .jobs import desk_of, redraw
 from .preview import Preview
@@ -132,7 +133,9 @@ class Session:
         with self._dropping():
             work = self._again(scene)
             self.proposed, self.said = (self._state(scene), work), ""
-            self.preview.show(context, work.labels)
+            notes = scene.wks_segment.notes()
+            shown = {character: merged(found, notes.joined) for character, found in work.labels.items()}
+            self.preview.show(context, shown, scene.wks_segment.style())
 
     def discard(self, scene: bpy.types.Scene) -> None:
         """Take back what is proposed, and the settings that it is from."""
