@@ -10,6 +10,7 @@ from . import command, menu, operators, panel, panel_segments, presets, session
 from .jobs import HOLDER, Desk
 from .segment_item import WKSSegmentItem
 from .settings import WKSSegmentSettings
+from .translations import TRANSLATIONS
 
 CLASSES = (
     WKSSegmentItem,
@@ -35,6 +36,7 @@ def register() -> None:
     bpy.types.Scene.wks_segment = bpy.props.PointerProperty(type=WKSSegmentSettings)
     setattr(bpy.types.WindowManager, HOLDER, Desk())
     setattr(bpy.types.WindowManager, session.HOLDER, session.Session())
+    bpy.app.translations.register(__name__, TRANSLATIONS)
     bpy.types.VIEW3D_MT_object.append(menu.draw_in_object_menu)
     _commands.append(bpy.utils.register_cli_command(COMMAND, command.run))
 
@@ -43,6 +45,7 @@ def unregister() -> None:
     """Called by Blender when the extension is disabled."""
     bpy.utils.unregister_cli_command(_commands.pop())
     bpy.types.VIEW3D_MT_object.remove(menu.draw_in_object_menu)
+    bpy.app.translations.unregister(__name__)
     for holder in (session.HOLDER, HOLDER):
         getattr(bpy.types.WindowManager, holder).close()
         delattr(bpy.types.WindowManager, holder)
