@@ -49,6 +49,7 @@ class PoseDescriber:
         """On which triangles."""
         raise NotImplementedError
 
+    @threadpool_limits.wrap(limits=1, user_api="blas")  # so that one pose and one of several have the same bits
     def describe(
         self,
         mesh: TriangleMesh,
