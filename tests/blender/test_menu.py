@@ -45,7 +45,9 @@ def user_folder(tmp_path, monkeypatch):
     """A folder of scripts of the user's own, so that no preset outlives the test."""
     monkeypatch.setattr(bpy.utils, "user_resource", lambda kind, path="", create=False: made(tmp_path / path))
     monkeypatch.setattr(bpy.utils, "preset_paths", lambda subdir: [str(tmp_path / "presets" / subdir)])
-    return tmp_path
+    label = presets.WKS_SEGMENT_MT_presets.bl_label
+    yield tmp_path
+    presets.WKS_SEGMENT_MT_presets.bl_label = label  # Blender puts the name of the preset there
 
 
 def made(path):
