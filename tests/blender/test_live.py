@@ -127,6 +127,18 @@ def test_the_number_that_was_learned_comes_back_as_it_was(walker, settings, sess
     assert settings.model == model
 
 
+def test_one_segment_more_leaves_the_others_their_numbers(walker, settings, session):
+    settings.n_segments = 2
+    rest(session)
+    before = labels_of(walker)
+    settings.n_segments = 3
+    rest(session)
+    after = labels_of(walker)
+    others = after != 2
+    assert set(after) == {0, 1, 2}
+    assert (after == before)[others].mean() > 0.9  # borders move a little
+
+
 def test_a_changed_seed_needs_nothing(walker, settings, session):
     before = snapshot(walker.data)
     settings.random_state = 5

@@ -454,7 +454,7 @@ def test_model_path_may_be_relative_to_the_blend_file(learned, tmp_path):
         (b"[1, 2", "no JSON"),
         (b"\x80\x04\x95\xff", "binary file"),
         (b'{"format": "wks_segment model", "version": 99}', "version 99"),
-        (b'{"format": "wks_segment model", "version": 3, "parameters": {}}', "damaged"),
+        (b'{"format": "wks_segment model", "version": 4, "parameters": {}}', "damaged"),
         (b"", "no JSON"),
     ],
 )

@@ -22,10 +22,21 @@ def overlaps(areas, shared=0.02):
 def test_what_a_long_border_holds_together_is_joined_first():
     grouping = Grouping.of(Contacts(ROW, EVEN, overlaps(EVEN)))
     assert grouping.pairs.tolist() == [[0, 1], [2, 3], [0, 2]]
-    assert grouping.groups(4).tolist() == [0, 1, 2, 3]
+    assert grouping.groups(4).tolist() == [0, 3, 1, 2]
     assert grouping.groups(3).tolist() == [0, 0, 1, 2]
     assert grouping.groups(2).tolist() == [0, 0, 1, 1]
     assert grouping.groups(1).tolist() == [0, 0, 0, 0]
+
+
+def test_one_group_more_splits_off_the_last_number_and_leaves_the_others():
+    areas = np.array([0.1, 0.3, 0.4, 0.2])
+    grouping = Grouping.of(Contacts(ROW, areas, overlaps(areas)))
+    for count in (1, 2, 3):
+        coarse, fine = grouping.groups(count), grouping.groups(count + 1)
+        kept = fine < count
+        np.testing.assert_array_equal(fine[kept], coarse[kept])
+        (split,) = set(coarse[~kept])  # what is split off was one group's, and less than half of it
+        assert areas[~kept].sum() <= areas[kept & (coarse == split)].sum()
 
 
 def test_the_sum_of_border_by_area_falls_by_the_best_join():
@@ -38,7 +49,8 @@ def test_the_sum_of_border_by_area_falls_by_the_best_join():
 
     areas = np.array([0.4, 0.3, 0.2, 0.1])
     best = min([[0, 0, 1, 2], [0, 1, 1, 2], [0, 1, 2, 2]], key=total)
-    assert Grouping.of(Contacts(ROW, areas, overlaps(areas))).groups(3).tolist() == best
+    found = Grouping.of(Contacts(ROW, areas, overlaps(areas))).groups(3)
+    assert (found[:, None] == found).tolist() == (np.array(best)[:, None] == best).tolist()
 
 
 def test_the_small_and_the_scattered_are_joined_before_others():

@@ -33,7 +33,8 @@ def changed(text, change):
     ("change", "message"),
     [
         (lambda c: c.update(format="glTF"), "not a model of WKS Segment"),
-        (lambda c: c.update(version=99), "the model has version 99, this program reads 3"),
+        (lambda c: c.update(version=99), "version 99, this program reads 4: update"),
+        (lambda c: c.update(version=3), "version 3, this program reads 4: learn it anew"),
         (lambda c: c.pop("means"), "means is missing"),
         (lambda c: c["means"].pop(), r"means has the shape \(23, 20\), not \(24, 20\)"),
         (lambda c: c["means"][0].__setitem__(0, "x"), "means is missing or not numbers"),

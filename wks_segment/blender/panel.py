@@ -85,7 +85,7 @@ class _Sidebar:
 
 
 class WKS_SEGMENT_PT_main(_Sidebar, bpy.types.Panel):
-    """Poses, the settings of the paper and the three buttons."""
+    """Poses, the settings that labels follow, and the three buttons."""
 
     bl_label = "WKS Segment"
     bl_idname = "WKS_SEGMENT_PT_main"
@@ -102,9 +102,8 @@ class WKS_SEGMENT_PT_main(_Sidebar, bpy.types.Panel):
             if settings.use_frame_range:
                 self.settings(context, "frame_first", "frame_last")
         self.segments(context)
-        self.settings(context, "sides")
+        self.settings(context, "sides", "smoothness", "min_share")
         self.live(context)
-        self.settings(context, "n_eigenpairs", "n_energies", "covariance_type", "random_state")
 
         column = self.layout.column(align=True)
         column.scale_y = 1.4
@@ -171,13 +170,15 @@ class WKS_SEGMENT_PT_advanced(SubPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         self.settings(
             context,
-            "smoothness",
-            "min_share",
             "snap_to",
             "preset",
             "pieces",
+            "n_eigenpairs",
+            "n_energies",
+            "covariance_type",
             "scaling",
             "laplacian",
+            "random_state",
             "limit_minutes",
             "limit_memory",
         )

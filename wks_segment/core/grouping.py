@@ -133,7 +133,8 @@ class Grouping:
     Attributes
     ----------
     pairs : (K − 1, 2) array of int
-        The groups that are joined in turn, each named by its lowest component, lower first.
+        The groups that are joined in turn, the larger first, whose name the joined group keeps. A group of one
+        component has that one's name.
     certainties : (K,) array
         With 1, 2, … K groups, how sure faces are of their group: Σ over faces of area times the squares of the
         posteriors, which is low where wide borders are long. It foretells how well unseen poses will agree.
@@ -160,6 +161,7 @@ class Grouping:
         alive = np.ones(count, dtype=bool)
         scattered = np.zeros(count, dtype=bool) if scattered is None else scattered.copy()
         pairs, cuts = np.zeros((count - 1, 2), dtype=np.int64), np.zeros(count)
+        name = np.arange(count)
         certainties, by_chance = np.ones(count), np.ones(count)
         for step in range(count - 1):
             certainties[count - 1 - step] = np.trace(overlaps)
@@ -173,7 +175,9 @@ class Grouping:
             rank = 4.0 * small + 2.0 * touch + np.where(touch, gain / (1 + np.abs(gain)), overlaps)
             rank[~np.triu(alive[:, None] & alive, 1)] = -np.inf
             i, j = divmod(int(rank.argmax()), count)
-            pairs[step] = i, j
+            larger, smaller = (i, j) if areas[i] >= areas[j] else (j, i)
+            pairs[step] = name[larger], name[smaller]
+            name[i] = name[larger]
             for table in (borders, overlaps):
                 table[i] += table[j]
                 table[:, i] += table[:, j]
@@ -184,11 +188,19 @@ class Grouping:
         return cls(pairs, certainties, by_chance, cuts)
 
     def groups(self, n_groups: int) -> IntArray:
-        """(K,) group of each component after as many joins as leave `n_groups`, numbered by their lowest component."""
+        """(K,) group of each component after as many joins as leave `n_groups`.
+
+        Numbered in the order in which the joins would be undone: one group more splits off the last number and leaves
+        the others as they are, so that names and colors stay where they were.
+        """
+        joins = len(self.certainties) - n_groups
         owner = np.arange(len(self.certainties))
-        for i, j in self.pairs[: len(owner) - n_groups]:
+        for i, j in self.pairs[:joins]:
             owner[owner == j] = i
-        return np.asarray(np.unique(owner, return_inverse=True)[1])
+        number = np.zeros(len(owner), dtype=np.int64)
+        for count, (_, split_off) in enumerate(self.pairs[joins:][::-1], start=1):
+            number[split_off] = count
+        return np.asarray(number[owner])
 
     def curve(self) -> FloatArray:
         """(K,) certainty of 1, 2, … K groups beyond chance: 1 where all are sure, 0 where only sizes are known.

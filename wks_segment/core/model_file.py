@@ -16,7 +16,7 @@ from .part_notes import PartNotes
 from .region_atlas import FIELDS, PLANES
 
 FORMAT = "wks_segment model"
-VERSION = 3
+VERSION = 4
 PARAMETERS = (
     "n_segments", "covariance_type", "n_eigenpairs", "n_energies", "accuracy", "random_state", "scaling",
     "pieces", "laplacian", "smoothness", "preset",
@@ -63,8 +63,10 @@ def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], Covariance
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise ModelFileError("this is not a model of WKS Segment")
     if content.get("version") != VERSION:
+        older = isinstance(content.get("version"), int) and content["version"] < VERSION
         raise ModelFileError(
-            f"the model has version {content.get('version')!r}, this program reads {VERSION}: update WKS Segment"
+            f"the model has version {content.get('version')!r}, this program reads {VERSION}: "
+            f"{'learn it anew' if older else 'update WKS Segment'}"
         )
     parameters = content.get("parameters")
     if not isinstance(parameters, dict) or set(parameters) != set(PARAMETERS):
@@ -137,10 +139,10 @@ def _length(content: dict[str, Any], name: str, most: int) -> int:
 
 
 def _check_joins(joins: FloatArray, n_components: int) -> None:
-    """Each join is of two groups that are there, named by their lowest components."""
+    """Each join is of two groups that are there, named by the larger one's name in it."""
     alive = set(range(n_components))
     for i, j in joins.tolist():
-        if not (i in alive and j in alive and i < j):
+        if not (i in alive and j in alive and i != j):
             raise ModelFileError(f"the model is damaged: joins has the pair {i:g}, {j:g}, which cannot be joined")
         alive.remove(j)
 
