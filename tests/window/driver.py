@@ -20,7 +20,7 @@ from typing import Any
 HERE = Path(__file__).resolve().parent
 SUITES = {"5.2": "sid", "4.3": "trixie"}
 """Which Debian has which Blender."""
-WIDTH, HEIGHT = 1280, 960
+WIDTH, HEIGHT = 1280, 1400
 """Size of the screen: high enough for the whole side panel."""
 MOUNTS = (
     ("proc", ["-t", "proc", "proc"]),
@@ -31,6 +31,8 @@ MOUNTS = (
 )
 HEADER = 26
 """Height of the header of a sub-panel."""
+ROW = 21
+"""Height of a row in a list."""
 PATIENCE = 600
 """Seconds after which Blender is taken to hang."""
 
@@ -272,6 +274,24 @@ class RealBlender:
         self.key("ctrl+a")
         self.type(text)
         self.key("Return")
+
+    def adjust(self, name: str, text: str) -> None:
+        """Give a field below the viewport, where the last operator is adjusted, a value; it is opened if need be."""
+        x, y, width, height = self.ask("region", "HUD")
+        if height < 2 * HEADER:
+            self.click(x + width // 2, y + height // 2)
+        found = self.ask("button", name, "HUD")
+        if not isinstance(found, list):
+            raise WindowError(f"the last operator has no {name}: {', '.join(sorted(found))}")
+        self.click(*found, repeat=2)
+        self.key("ctrl+a")
+        self.type(text)
+        self.key("Return")
+
+    def row(self, index: int) -> tuple[int, int]:
+        """Where the name of a segment in the list is."""
+        x, y = self.find("active_segment")
+        return x, y + ROW * index
 
     def choose(self, name: str, letter: str) -> None:
         """Open a menu of the side panel and press the letter that is underlined in an item."""

@@ -125,12 +125,46 @@ def state():
 
 def segments(name):
     """{part: number of faces} of an object; empty without segments."""
-    attribute = bpy.data.objects[name].data.attributes.get("wks_segment")
-    if attribute is None:
+    mesh = bpy.data.objects[name].data
+    if "wks_segment" not in mesh.attributes:
         return {}
-    values = np.empty(len(attribute.data), dtype=np.int32)
-    attribute.data.foreach_get("value", values)
-    return {str(part): int(count) for part, count in zip(*np.unique(values, return_counts=True), strict=True)}
+    found = np.unique(_values(mesh, "wks_segment"), return_counts=True)
+    return {str(part): int(count) for part, count in zip(*found, strict=True)}
+
+
+def rows():
+    """The list of segments: [name, share, hidden, number of selected faces] of each."""
+    obj = bpy.context.view_layer.objects.active
+    mesh = obj.data
+    if obj.mode == "EDIT":
+        obj.update_from_editmode()
+    parts, chosen = (_values(mesh, name) for name in ("wks_segment", ".select_poly"))
+    return [
+        [item.name, item.share, item.hidden, int(chosen[parts == item.number].sum())]
+        for item in _window().scene.wks_segment.segments
+    ]
+
+
+def image_colors(name):
+    """How many pixels of an image have each color, as "r g b a" in bytes."""
+    image = bpy.data.images.get(name)
+    if image is None:
+        return {}
+    pixels = np.empty(len(image.pixels), dtype=np.float32)
+    image.pixels.foreach_get(pixels)
+    found, count = np.unique((pixels.reshape(-1, 4) * 255).round().astype(int), axis=0, return_counts=True)
+    return {" ".join(map(str, color)): int(n) for color, n in zip(found, count, strict=True)}
+
+
+def objects():
+    """Name and parent of each object."""
+    return {obj.name: obj.parent.name if obj.parent else None for obj in bpy.data.objects}
+
+
+def make_active(name):
+    """Make an object the active one: what lies inside another cannot be clicked."""
+    _window().view_layer.objects.active = bpy.data.objects[name]
+    yield from settle()
 
 
 def job_runs():
@@ -194,6 +228,15 @@ def redraws():
     """Seconds between redraws since `watch_redraws`, and the end of it."""
     times = bpy.app.driver_namespace.pop("redraws")
     return [after - before for before, after in itertools.pairwise(times)]
+
+
+def _values(mesh, name):
+    """Numbers of an attribute of faces; zeros where there is none."""
+    values = np.zeros(len(mesh.polygons), dtype=np.int32)
+    attribute = mesh.attributes.get(name)
+    if attribute is not None:
+        attribute.data.foreach_get("value", values)
+    return values
 
 
 def _fingerprint(attribute):

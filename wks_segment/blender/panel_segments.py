@@ -35,6 +35,7 @@ class WKS_SEGMENT_UL_segments(bpy.types.UIList):
         # Colors are written to corners of faces, which is not possible in Edit Mode.
         color.enabled = context.mode != "EDIT_MESH"
         color.prop(item, "color", text="")
+        row.separator(factor=0.5)
         row.prop(item, "name", text="", emboss=False)
         share = row.row(align=True)
         share.alignment = "RIGHT"

@@ -32,7 +32,7 @@ EMPTY = 1e-6
 
 BEST_WITHIN, MOST_SEGMENTS = 0.06, 16
 """The number of segments, where it is left open: the most, up to this many, that are nearly as certain as any."""
-MOST_CUT = 12.0
+MOST_CUT = 10.0
 """Border by area, on average over groups, above which these are pieces of what people see as one."""
 
 
@@ -47,8 +47,8 @@ class Ground:
         Of the m original faces.
     lengths : (p,) array
         Weighted border length between neighbours, for a surface of area 1.
-    part : (m,) int array
-        Part of each face as a person would cut this pose.
+    part : (s, m) int array
+        Part of each face as a person would cut this pose, coarse to fine.
     """
 
     surface: Surface
@@ -66,13 +66,19 @@ class Ground:
         return cls(surface, adjacency, lengths, parts(surface, adjacency, lengths, curvature))
 
     def unlike_parts(self, labels: IntArray) -> float:
-        """Rand-index error of the connected regions of (m,) labels against the parts, by area (Rand, 1971)."""
+        """Rand-index error of the connected regions of (m,) labels against the parts, by area (Rand, 1971).
+
+        The mean over coarse and fine parts.
+        """
         region = connected_regions(labels, self.adjacency)
         shares = self.surface.original.face_areas / self.surface.original.area
-        both = coo_matrix((shares, (region, self.part))).tocsr()
-        both.sum_duplicates()
-        each = np.square(np.bincount(region, shares)).sum() + np.square(np.bincount(self.part, shares)).sum()
-        return float(each - 2 * np.square(both.data).sum())
+        errors = []
+        for part in self.part:
+            both = coo_matrix((shares, (region, part))).tocsr()
+            both.sum_duplicates()
+            each = np.square(np.bincount(region, shares)).sum() + np.square(np.bincount(part, shares)).sum()
+            errors.append(each - 2 * np.square(both.data).sum())
+        return float(np.mean(errors))
 
 
 @dataclass(frozen=True)
