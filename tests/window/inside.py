@@ -145,6 +145,11 @@ def rows():
     ]
 
 
+def face_sets(name):
+    """How many face sets an object has."""
+    return len(np.unique(_values(bpy.data.objects[name].data, ".sculpt_face_set")))
+
+
 def image_colors(name):
     """How many pixels of an image have each color, as "r g b a" in bytes."""
     image = bpy.data.images.get(name)
