@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from . import command, menu, operators, panel, panel_segments, presets, session
+from . import commands, menu, operators, panel, panel_segments, presets, session
 from .jobs import HOLDER, Desk
 from .segment_item import WKSSegmentItem
 from .settings import WKSSegmentSettings
@@ -38,7 +38,7 @@ def register() -> None:
     setattr(bpy.types.WindowManager, session.HOLDER, session.Session())
     bpy.app.translations.register(__name__, TRANSLATIONS)
     bpy.types.VIEW3D_MT_object.append(menu.draw_in_object_menu)
-    _commands.append(bpy.utils.register_cli_command(COMMAND, command.run))
+    _commands.append(bpy.utils.register_cli_command(COMMAND, commands.run))
 
 
 def unregister() -> None:
