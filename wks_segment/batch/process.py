@@ -114,8 +114,7 @@ class Child:
             self._process.stdin.close()
             self._process.wait(PATIENCE)
         except (OSError, subprocess.TimeoutExpired):
-            pass_on = self._process
-            pass_on.kill()
+            self._process.kill()
         self._forget()
 
     def kill(self) -> None:
