@@ -1,4 +1,4 @@
-"""Jobs on many machines, by Dask: the same jobs in the same children, which the workers of a cluster look after.
+"""Jobs on many machines, by Dask, which is imported with this module and not elsewhere: the same jobs in the same children, which the workers of a cluster look after.
 
 A worker that dies takes nothing with it: its jobs are done anew by others. All machines see the same files under the
 same paths.
@@ -13,7 +13,8 @@ import threading
 import uuid
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+
+from distributed import Client, KilledWorker, Worker, WorkerPlugin, as_completed, get_worker
 
 from .errors import BatchError, EndedError
 from .job import Job, Outcome
@@ -38,17 +39,10 @@ def outcomes(jobs: Sequence[Job], scheduler: str, limits: Limits, unfinished: Pa
     Raises
     ------
     BatchError
-        If Dask is not installed here, or there is no scheduler.
+        If there is no scheduler.
     """
     try:
-        import distributed
-    except ImportError:
-        raise BatchError(
-            f'--scheduler needs Dask, which is not installed in {sys.executable}: pip install "wks-segment[dask]", '
-            "here and on the workers"
-        ) from None
-    try:
-        client = distributed.Client(scheduler, timeout=CONNECT_SECONDS, set_as_default=False)
+        client = Client(scheduler, timeout=CONNECT_SECONDS, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise BatchError(f"{scheduler}: no Dask scheduler answers there: {error}") from error
     name = f"wks_segment-{uuid.uuid4().hex}"
@@ -63,7 +57,7 @@ def outcomes(jobs: Sequence[Job], scheduler: str, limits: Limits, unfinished: Pa
                 for job in jobs
             }  # fmt: skip
             # Forgotten as they come, or the scheduler would keep all of them.
-            for future in distributed.as_completed(list(futures)):
+            for future in as_completed(list(futures)):
                 job = futures.pop(future)
                 error = future.exception()
                 yield future.result() if error is None else (_lost(job, error), "")
@@ -82,21 +76,20 @@ def program() -> Program:
 
 def _do(job: Job, seconds: float, unfinished: str, plugin: str) -> Done:
     """Runs on a worker, in one of its threads."""
-    from distributed import get_worker
-
-    children: _Children = get_worker().plugins[plugin]
+    children = get_worker().plugins[plugin]
+    assert isinstance(children, _Children)
     return children.do(job, seconds, Path(unfinished))
 
 
 def _lost(job: Job, error: BaseException) -> Outcome:
     """A job that no worker finished."""
     reason = f"no worker finished it: {type(error).__name__}: {error}".partition("\n")[0]
-    if type(error).__name__ == "KilledWorker":
+    if isinstance(error, KilledWorker):
         reason = "each worker that began it died, and it is not tried again; do their machines have enough memory?"
     return Outcome(job.input, job.name, job.key, "failed", reason)
 
 
-class _Children:
+class _Children(WorkerPlugin):
     """The children of one worker, in a batch: a plugin of Dask, which sets it up on each worker that there is or comes.
 
     As many children as jobs are at work at once, which is the number of the worker's threads.
@@ -105,13 +98,13 @@ class _Children:
     def __init__(self, name: str, limits: Limits) -> None:
         self.name, self.limits = name, limits
 
-    def setup(self, worker: Any) -> None:
+    def setup(self, worker: Worker) -> None:
         """Called by Dask on the worker."""
         self._ended = threading.Event()
         self._free: queue.SimpleQueue[Child] = queue.SimpleQueue()
         self._memory = self.limits.bytes()
 
-    def teardown(self, worker: Any) -> None:
+    def teardown(self, worker: Worker) -> None:
         """Called by Dask when the batch or the worker ends."""
         self._ended.set()
         while not self._free.empty():
