@@ -3,10 +3,28 @@
 The children run the command line of `wks_segment.blender`, which is all that this room knows of it.
 """
 
+from .child import Answer, serve
 from .errors import BatchError
 from .inputs import inputs_of, names_of
-from .job import Job, Outcome
+from .job import Job, Outcome, content_of, key_of
 from .limits import Limits
-from .run import Batch
+from .process import COMMAND, Program, python_program
+from .run import Batch, merged
 
-__all__ = ["Batch", "BatchError", "Job", "Limits", "Outcome", "inputs_of", "names_of"]
+__all__ = [
+    "COMMAND",
+    "Answer",
+    "Batch",
+    "BatchError",
+    "Job",
+    "Limits",
+    "Outcome",
+    "Program",
+    "content_of",
+    "inputs_of",
+    "key_of",
+    "merged",
+    "names_of",
+    "python_program",
+    "serve",
+]

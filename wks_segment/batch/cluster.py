@@ -1,17 +1,15 @@
-"""Jobs on many machines, by Dask, which is imported with this module and not elsewhere: the same jobs in the same children, which the workers of a cluster look after.
+"""Jobs on many machines, by Dask: the same jobs in the same children, which the workers of a cluster look after.
 
 A worker that dies takes nothing with it: its jobs are done anew by others. All machines see the same files under the
-same paths.
+same paths. Only this module imports Dask, and it is imported only if a scheduler is given.
 """
 
 from __future__ import annotations
 
-import os
 import queue
-import sys
 import threading
 import uuid
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from pathlib import Path
 
 from distributed import Client, KilledWorker, Worker, WorkerPlugin, as_completed, get_worker
@@ -20,7 +18,7 @@ from .errors import BatchError, EndedError
 from .job import Job, Outcome
 from .limits import Limits
 from .local import Done
-from .process import Child, Program
+from .process import Child, python_program
 from .work import do
 
 CONNECT_SECONDS = 10
@@ -28,7 +26,7 @@ RETRIES = 2
 """Times that a job is done anew after its worker could not even begin it, as where the folder is not mounted."""
 
 
-def outcomes(jobs: Sequence[Job], scheduler: str, limits: Limits, unfinished: Path) -> Iterator[Done]:
+def outcomes(jobs: Sequence[Job], scheduler: str, limits: Limits, unfinished: Path) -> Generator[Done]:
     """What comes of each job, as soon as it is there. To close the iterator ends all children.
 
     Parameters
@@ -65,13 +63,6 @@ def outcomes(jobs: Sequence[Job], scheduler: str, limits: Limits, unfinished: Pa
         finally:
             # What is at work ends with the children.
             client.unregister_worker_plugin(name)
-
-
-def program() -> Program:
-    """How a worker starts a child: by the Python and the packages that it runs on itself."""
-    root = str(Path(__file__).parents[2])
-    paths = os.pathsep.join(dict.fromkeys([root, *filter(None, sys.path)]))
-    return Program((sys.executable, "-m", "wks_segment", "batch-child"), (("PYTHONPATH", paths),))
 
 
 def _do(job: Job, seconds: float, unfinished: str, plugin: str) -> Done:
@@ -112,7 +103,7 @@ class _Children(WorkerPlugin):
 
     def do(self, job: Job, seconds: float, unfinished: Path) -> Done:
         """See `work.do`."""
-        child = Child(program(), self._memory, self._ended.is_set) if self._free.empty() else self._free.get()
+        child = Child(python_program(), self._memory, self._ended.is_set) if self._free.empty() else self._free.get()
         try:
             return do(job, child, seconds, unfinished)
         except EndedError:

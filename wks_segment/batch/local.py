@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import queue
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from pathlib import Path
 
 from .errors import EndedError
@@ -19,7 +19,7 @@ Done = tuple[Outcome, str]
 
 def outcomes(
     jobs: Sequence[Job], program: Program, processes: int, limits: Limits, unfinished: Path
-) -> Iterator[Done]:
+) -> Generator[Done]:
     """What comes of each job, as soon as it is there. To close the iterator ends all children.
 
     Raises
@@ -53,7 +53,7 @@ def outcomes(
         for thread in threads:
             thread.start()
         for _ in jobs:
-            done = found.get()
+            done = _next(found)
             if isinstance(done, BaseException):
                 raise done
             yield done
@@ -62,3 +62,12 @@ def outcomes(
         for thread in threads:
             if thread.ident is not None:
                 thread.join()
+
+
+def _next(found: queue.SimpleQueue[Done | BaseException]) -> Done | BaseException:
+    """The next in a queue. Asked again and again, since on Windows Ctrl+C does not end a wait."""
+    while True:
+        try:
+            return found.get(timeout=1)
+        except queue.Empty:
+            continue

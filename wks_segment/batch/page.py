@@ -39,7 +39,9 @@ def write_page(folder: Path, outcomes: Iterable[Outcome], planned: int, title: s
     known = sorted(outcomes, key=lambda outcome: outcome.name.casefold())
     failed, done = [each for each in known if not each.done], [each for each in known if each.done]
     missing = planned - len(known)
-    summary = f"{len(done)} of {planned} files done, {len(failed)} failed" + (f", {missing} to do" if missing > 0 else "")
+    summary = f"{len(done)} of {planned} files done, {len(failed)} failed" + (
+        f", {missing} to do" if missing > 0 else ""
+    )
     text = "\n".join([
         "<!doctype html>",
         f'<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>',
@@ -79,7 +81,9 @@ def _figure(outcome: Outcome) -> str:
     said += [f"{len(poses)} pose{'s' * (len(poses) != 1)}"] if (poses := outcome.result.get("poses")) else []
     said += [f"best model: {outcome.result['best']}"] if outcome.result.get("best") else []
     said += [f"{outcome.seconds:.1f} seconds"]
-    warnings = [f'<br><small class="warning">{escape(str(each))}</small>' for each in outcome.result.get("warnings", ())]
+    warnings = [
+        f'<br><small class="warning">{escape(str(each))}</small>' for each in outcome.result.get("warnings", ())
+    ]
     return (
         f'<figure>{shown}<figcaption><strong title="{escape(outcome.input)}">{escape(outcome.name)}</strong><br>'
         f"<small>{escape(', '.join(said))}</small><br>{'<br>'.join(links)}{''.join(warnings)}</figcaption></figure>"

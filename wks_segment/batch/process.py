@@ -7,6 +7,7 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -17,6 +18,8 @@ from .child import READY, Answer
 from .errors import BatchError, EndedError
 from .limits import resident
 
+COMMAND = "batch-child"
+"""Of the command line: hands over to `child.serve`."""
 LOOK = 0.05
 """Seconds between two looks at a child."""
 START_SECONDS = 180.0
@@ -27,13 +30,7 @@ LIFE = 100
 """Calls after which a child is replaced: what libraries do not give back is given back then."""
 LAST_LINES = 3
 """Of what a child printed, for the reason of a crash."""
-ONE_THREAD = {
-    name: "1"
-    for name in (
-        "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMEXPR_NUM_THREADS",
-        "BLIS_NUM_THREADS",
-    )
-}  # fmt: skip
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMEXPR_NUM_THREADS", "BLIS_NUM_THREADS"), "1")  # fmt: skip
 """Environment of children: there is one for each core, and libraries read these when they are loaded."""
 
 
@@ -51,6 +48,12 @@ class Program:
 
     command: tuple[str, ...]
     environment: tuple[tuple[str, str], ...] = ()
+
+
+def python_program() -> Program:
+    """A child by the Python that runs, with the packages that it has."""
+    paths = os.pathsep.join(dict.fromkeys([str(Path(__file__).parents[2]), *filter(None, sys.path)]))
+    return Program((sys.executable, "-m", "wks_segment", COMMAND), (("PYTHONPATH", paths),))
 
 
 class ChildError(Exception):

@@ -62,7 +62,7 @@ class Record:
         self._lines = 0
 
     def __enter__(self) -> Record:
-        self._file = open(self.path, "a+", encoding="utf-8", errors="replace")  # noqa: SIM115  # closed at exit
+        self._file = open(self.path, "a+", encoding="utf-8", errors="replace")  # closed at exit
         if not _locked(self._file):
             self._file.close()
             raise BatchError(f"{self.path}: another batch is at work on it: wait for its end, or take another --output")

@@ -7,9 +7,10 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +72,7 @@ class Batch:
             at work there, if no child can be started, or if the user ends it.
         """
         self._check_folder()
+        self._check_means()
         self.folder.mkdir(parents=True, exist_ok=True)
         mine = self.jobs if self.part is None else self.jobs[self.part[0] - 1 :: self.part[1]]
         name = record_name(self.part)
@@ -88,7 +90,10 @@ class Batch:
                 if not any((self.folder / UNFINISHED).iterdir()):
                     (self.folder / UNFINISHED).rmdir()
                 known = [record.outcomes[job.input] for job in mine if job.input in record.outcomes]
-                page = write_page(self.folder, self._all(known), len(self.jobs))
+                if known:
+                    page = write_page(self.folder, self._all(known), len(self.jobs))
+                else:  # it did not even begin: the same command may begin it
+                    record.path.unlink()
         failed = {outcome.input: outcome.reason for outcome in known if not outcome.done}
         return {
             "files": len(mine), "done": len(known) - len(failed), "now": len(waiting), "failed": failed,
@@ -97,41 +102,42 @@ class Batch:
 
     def _do(self, jobs: Sequence[Job], record: Record, of: int, unfinished: Path, progress: Progress) -> None:
         """Do jobs; what comes of each is in the list as soon as it is there."""
-        begun, failures = time.monotonic(), 0
-        progress(_said(of - len(jobs), of, 0, None, ""), (of - len(jobs)) / max(of, 1))
+        begun, failures, before = time.monotonic(), 0, of - len(jobs)
+        done = before
+        progress(_said(done, of, 0, None, ""), done / of)
         with _ended_by_signals(), closing(self._outcomes(jobs, unfinished)) as outcomes:
             try:
-                for i, (outcome, place) in enumerate(outcomes, 1):
+                for outcome, place in outcomes:
                     # The list before the files: what is there without being in it is not ours.
                     record.add(outcome)
                     for path in outcome.outputs.values():
                         (self.folder / path).parent.mkdir(parents=True, exist_ok=True)
                         (unfinished / place / path).replace(self.folder / path)
                     failures += not outcome.done
-                    left = (time.monotonic() - begun) / i * (len(jobs) - i)
-                    done = of - len(jobs) + i
+                    done += 1
+                    left = (time.monotonic() - begun) / (done - before) * (of - done)
                     progress(_said(done, of, failures, left, outcome.name), done / of)
             except KeyboardInterrupt:
                 raise BatchError(
-                    f"ended by the user with {of - len(jobs) + i if record.outcomes else 0} of {of} files done: "
-                    "go on with the same command and --resume"
+                    f"ended by the user with {done} of {of} files done: go on with the same command and --resume"
                 ) from None
 
-    def _outcomes(self, jobs: Sequence[Job], unfinished: Path) -> Iterator[local.Done]:
-        if not jobs:
-            return iter(())
-        if self.scheduler is None:
-            if self.limits.memory is not None and not can_watch_memory():
-                raise BatchError("--memory-limit needs Linux, or the package psutil")
+    def _outcomes(self, jobs: Sequence[Job], unfinished: Path) -> Generator[local.Done]:
+        if self.scheduler is None or not jobs:
             return local.outcomes(jobs, self.program, self.processes, self.limits, unfinished)
-        try:
-            from . import cluster
-        except ImportError:
+        from . import cluster
+
+        return cluster.outcomes(jobs, self.scheduler, self.limits, unfinished.resolve())
+
+    def _check_means(self) -> None:
+        """What is asked for can be had here."""
+        if self.scheduler is not None and find_spec("distributed") is None:
             raise BatchError(
                 f'--scheduler needs Dask, which is not installed in {sys.executable}: pip install "wks-segment[dask]", '
                 "here and on the workers"
-            ) from None
-        return cluster.outcomes(jobs, self.scheduler, self.limits, unfinished.resolve())
+            )
+        if self.scheduler is None and self.limits.memory is not None and not can_watch_memory():
+            raise BatchError("--memory-limit needs Linux, or the package psutil")
 
     def _known(self, job: Job, outcome: Outcome | None) -> bool:
         """Whether a job was done before, and its results are there."""

@@ -66,8 +66,14 @@ def do(job: Job, child: Child, seconds: float, unfinished: Path) -> tuple[Outcom
         status="failed" if result is None else "done",
         reason=reason,
         seconds=round(time.monotonic() - begun, 3),
-        outputs={} if result is None else job.outputs,
+        outputs={} if result is None else {**job.outputs, **_beside(folder, job)},
         machine=platform.node(),
         result={name: result[name] for name in KEPT if name in result} if result else {},
     )  # fmt: skip
     return outcome, folder.name if outcome.done else ""
+
+
+def _beside(folder: Path, job: Job) -> dict[str, str]:
+    """What a command wrote beside its outputs, as the materials of an .obj file, by its own name."""
+    paths = (path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*")) if path.is_file())
+    return {path: path for path in paths if path not in job.outputs.values()}

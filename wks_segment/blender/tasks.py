@@ -97,7 +97,7 @@ def check_limits(model: PoseSegmentation, poses: Sequence[Pose], settings: WKSSe
 
 def learn(
     model: PoseSegmentation, poses: Sequence[Pose], report: Report, progress: Progress,
-    cache: SignatureCache | None = None,
+    cache: SignatureCache | None = None, workers: int | None = None,
 ) -> list[Workpiece]:  # fmt: skip
     """Fit a model to poses; what is known of each pose.
 
@@ -112,7 +112,7 @@ def learn(
             f'"{poses[0].character.name}" has {most} faces, too few for {model.n_segments} segments: '
             "take fewer segments, or subdivide it"
         )
-    described = describe(model, poses, report, progress, DESCRIBED, cache)
+    described = describe(model, poses, report, progress, DESCRIBED, cache, workers)
     with report.stage("mixture"):
         try:
             model.fit(described, lambda stage, share: progress("Learning the segments", share), poses[0].upright)
@@ -124,7 +124,7 @@ def learn(
 
 def describe(
     model: PoseSegmentation, poses: Sequence[Pose], report: Report, progress: Progress, share: float = 1.0,
-    cache: SignatureCache | None = None,
+    cache: SignatureCache | None = None, workers: int | None = None,
 ) -> list[Workpiece]:  # fmt: skip
     """Signature of each pose, to be labelled; poses that are one and the same surface are computed once.
 
@@ -154,6 +154,7 @@ def describe(
                     [connections[i] for i in new],
                     lambda stage, done: progress(f"Signature of {stage}", share * done),
                     [f'"{poses[i].name}"' for i in new],
+                    workers=workers,
                     cache=cache,
                 )
         except (ValueError, SpectrumError, MemoryError) as error:

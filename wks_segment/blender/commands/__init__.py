@@ -6,12 +6,13 @@ import argparse
 import json
 import sys
 
+from ...batch import Answer
 from ..errors import UserError
 from ..terminal import only_result_on_stdout, terminal_progress
-from . import apply, bake, demo, segment
+from . import apply, bake, batch, demo, segment
 from .common import text_of
 
-COMMANDS = (segment, apply, bake, demo)
+COMMANDS = (segment, apply, bake, batch, demo)
 """Modules that add a command each, in the order of the help."""
 
 
@@ -28,7 +29,19 @@ def run(arguments: list[str]) -> int:
                 print(json.dumps({"error": str(error)}), file=stdout)
             return 1
         print(json.dumps(result) if options.json else options.text(result), file=stdout)
-    return 0
+    return 1 if result.get("failed") else 0  # files of a batch, by name
+
+
+def answer(arguments: list[str]) -> Answer:
+    """Run one command of a batch in this process."""
+    try:
+        options = _parser().parse_args(arguments)
+    except SystemExit:  # argparse, which has printed why
+        return Answer(None, f"wrong usage: {' '.join(arguments)}")
+    try:
+        return Answer(options.run(options, lambda stage, share: None))
+    except UserError as error:
+        return Answer(None, str(error))
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -38,6 +51,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for module in COMMANDS:
         module.add(commands)
+    batch.add_child(commands, answer)
     for command in commands.choices.values():
         command.add_argument("--json", action="store_true", help="print one JSON object")
         if command.get_default("text") is None:

@@ -10,8 +10,8 @@ from ...core.description import Progress
 from .. import files, tasks
 from ..errors import UserError
 from ..report import Report
-from .common import check_outputs, label, load_model, read_poses, result_of, settings_of
-from .options import add_labelling, add_outputs, add_poses
+from .common import cache_of, check_outputs, label, load_model, read_poses, result_of, settings_of
+from .options import add_labelling, add_means, add_outputs, add_poses
 
 
 def add(commands: Any) -> None:
@@ -21,6 +21,7 @@ def add(commands: Any) -> None:
     apply.add_argument("--model", type=Path, required=True, help="a model that learn or segment wrote")
     add_labelling(apply)
     add_outputs(apply)
+    add_means(apply)
     apply.set_defaults(run=_apply)
 
 
@@ -28,6 +29,7 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     if not (options.output or options.render):
         raise UserError("apply has nothing to write: give --output, --render or both")
     check_outputs(options)
+    cache = cache_of(options)
     model = load_model(options.model)
     report = Report([])
     report.tell_of(model)
@@ -37,7 +39,7 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     if options.smoothness is not None:
         model.smoothness = settings.smoothness
     tasks.check_limits(model, poses, settings)
-    described = tasks.describe(model, poses, report, progress)
+    described = tasks.describe(model, poses, report, progress, cache=cache, workers=options.threads)
     label(model, poses, described, settings, options, report, progress)
     settings.keep_model(model, [f"From {options.model.name}", f"{model.n_segments_} segments"])
     if options.output:

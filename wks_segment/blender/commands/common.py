@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 
-from ...core import PartNotes, PoseSegmentation
+from ...core import DiskCache, PartNotes, PoseSegmentation
 from ...core.description import Progress
 from .. import files, parts, tasks
 from .. import poses as reader
@@ -39,6 +39,16 @@ def check_picture(path: Path) -> None:
     if path.suffix.lower() != ".png":
         raise UserError(f"{path}: a picture is written as .png")
     files.check_folder(path)
+
+
+def cache_of(options: argparse.Namespace) -> DiskCache | None:
+    """Where signatures are kept; None if nothing is said of that. UserError if there can be none."""
+    if options.cache is None:
+        return None
+    try:
+        return DiskCache(options.cache, round(1e9 * options.cache_limit))
+    except OSError as error:
+        raise UserError(f"{options.cache}: it cannot be a cache: {error.strerror or error}") from error
 
 
 def read_poses(options: argparse.Namespace, report: Report) -> list[Pose]:

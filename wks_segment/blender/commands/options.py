@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from ...core.cache import DISK
 from .. import files
 from ..settings import WKSSegmentSettings
 
@@ -26,6 +27,11 @@ OPTIONS = {
     "--preset": "preset",
 }
 """Options that are settings: their text, limits and defaults come from the property group."""
+POSE_OPTIONS = {
+    "--frames": "frames", "--shape-keys": "shape_keys", "--markers": "markers", "--actions": "actions",
+    "--action": "action", "--object": "object",
+}  # fmt: skip
+"""Options that say where the poses are."""
 OUTPUT_OPTIONS = {
     "--vertex-groups": "vertex_groups", "--snap-to": "snap_to", "--sides": "sides", "--palette": "palette",
 }  # fmt: skip
@@ -47,6 +53,11 @@ AUTOMATIC = {"n_segments": "auto_segments"}
 def add_poses(parser: argparse.ArgumentParser) -> None:
     """Files, and where the poses in them are."""
     parser.add_argument("files", type=Path, nargs="+", metavar="FILE", help=", ".join(files.IMPORTERS))
+    add_pose_sources(parser)
+
+
+def add_pose_sources(parser: argparse.ArgumentParser) -> None:
+    """Where the poses in a file are."""
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
         "--frames", type=_frames, metavar="FIRST:LAST:COUNT",
@@ -70,9 +81,30 @@ def add_outputs(parser: argparse.ArgumentParser) -> None:
     """What is written of labels."""
     parser.add_argument("--output", type=Path, help=f"write the scene to this file ({', '.join(files.EXPORTERS)})")
     parser.add_argument("--render", type=Path, metavar="PNG", help="write a picture of all poses side by side")
+    add_output_settings(parser)
+
+
+def add_output_settings(parser: argparse.ArgumentParser) -> None:
+    """How labels are written."""
     for option, (name, text) in OUTPUT_FLAGS.items():
         parser.add_argument(option, action="store_true", dest=name, help=text)
     add_settings(parser, OUTPUT_OPTIONS)
+
+
+def add_means(parser: argparse.ArgumentParser) -> None:
+    """What a command may use: nothing of it changes a result."""
+    parser.add_argument(
+        "--cache", type=Path, metavar="DIR",
+        help="keep what takes the time in this folder, for the next run with the same poses; several may share it",
+    )  # fmt: skip
+    parser.add_argument(
+        "--cache-limit", type=within(float, 0.01, 100_000), default=DISK / 1e9, metavar="GB",
+        help=f"what was not used for longest leaves the cache above this size (default: {DISK / 1e9:g})",
+    )  # fmt: skip
+    parser.add_argument(
+        "--threads", type=within(int, 1, 256), metavar="N",
+        help="poses that are computed side by side (default: as many as there are cores and memory for, at most 4)",
+    )  # fmt: skip
 
 
 def add_labelling(parser: argparse.ArgumentParser) -> None:
@@ -141,6 +173,25 @@ def _some_of(known: list[str]) -> Callable[[str], set[str]]:
         return set(chosen)
 
     return parse
+
+
+def as_arguments(options: argparse.Namespace) -> list[str]:
+    """Poses and settings that were given, as arguments again: the same for the same, in whatever order they came."""
+    found = []
+    for option, name in (POSE_OPTIONS | OPTIONS | OUTPUT_OPTIONS).items():
+        value = getattr(options, name, None)
+        for each in value if isinstance(value, list) else [] if value is None else [value]:
+            found.append(f"{option}={_text_of(each)}")
+    return found + [option for option, (name, _) in OUTPUT_FLAGS.items() if getattr(options, name, False)]
+
+
+def _text_of(value: Any) -> str:
+    """What the parser of an option takes for a value that it gave."""
+    if isinstance(value, set):
+        return ",".join(sorted(value))
+    if isinstance(value, tuple):  # frames
+        return str(value[2]) if value[0] is None else ":".join(map(str, value))
+    return str(value)
 
 
 def _frames(text: str) -> tuple[int | None, int | None, int]:

@@ -9,8 +9,8 @@ from typing import Any
 from ...core.description import Progress
 from .. import files, tasks
 from ..report import Report, pose_warnings, segment_warnings
-from .common import check_outputs, label, read_poses, result_of, save_model, settings_of
-from .options import add_outputs, add_poses, add_settings
+from .common import cache_of, check_outputs, label, read_poses, result_of, save_model, settings_of
+from .options import add_means, add_outputs, add_poses, add_settings
 
 
 def add(commands: Any) -> None:
@@ -20,24 +20,27 @@ def add(commands: Any) -> None:
     add_settings(segment)
     segment.add_argument("--model", type=Path, help="write the model to this file")
     add_outputs(segment)
+    add_means(segment)
     segment.set_defaults(run=_segment)
     learn = commands.add_parser("learn", help="learn a model from the poses in files")
     add_poses(learn)
     add_settings(learn)
     learn.add_argument("--model", type=Path, required=True, help="write the model to this file")
+    add_means(learn)
     learn.set_defaults(run=_segment, output=None, render=None)
 
 
 def _segment(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     """`segment` and, without outputs, `learn`."""
     check_outputs(options)
+    cache = cache_of(options)
     files.check_folder(options.model) if options.model else None
     report = Report([])
     poses = read_poses(options, report)
     settings = settings_of(options)
     model = settings.new_model()
     tasks.check_limits(model, poses, settings)
-    described = tasks.learn(model, poses, report, progress)
+    described = tasks.learn(model, poses, report, progress, cache, options.threads)
     if options.model:
         save_model(model, options.model)
     if options.output or options.render:
