@@ -57,8 +57,8 @@ def outcomes(jobs: Sequence[Job], scheduler: str, limits: Limits, unfinished: Pa
             # Forgotten as they come, or the scheduler would keep all of them.
             for future in as_completed(list(futures)):
                 job = futures.pop(future)
-                error = future.exception()
-                yield future.result() if error is None else (_lost(job, error), "")
+                problem = future.exception()
+                yield future.result() if problem is None else (_lost(job, problem), "")
                 future.release()
         finally:
             # What is at work ends with the children.

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from .child import READY, Answer
 from .errors import BatchError, EndedError
@@ -30,7 +31,13 @@ LIFE = 100
 """Calls after which a child is replaced: what libraries do not give back is given back then."""
 LAST_LINES = 3
 """Of what a child printed, for the reason of a crash."""
-ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMEXPR_NUM_THREADS", "BLIS_NUM_THREADS"), "1")  # fmt: skip
+ONE_THREAD = {
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "BLIS_NUM_THREADS": "1",
+    "VECLIB_MAXIMUM_THREADS": "1",
+}
 """Environment of children: there is one for each core, and libraries read these when they are loaded."""
 
 
@@ -146,14 +153,14 @@ class Child:
             raise BatchError(f"no child process could be started by {' '.join(command[:-1])}: {error}") from error
         return process
 
-    def _await(self, process: subprocess.Popen[bytes], answer: Path, seconds: float) -> dict[str, object]:
+    def _await(self, process: subprocess.Popen[bytes], answer: Path, seconds: float) -> dict[str, Any]:
         """The content of a file that a child writes."""
         until = time.monotonic() + seconds
         fresh = self._calls <= 1
         while True:
             over = process.poll() is not None
             if answer.exists():
-                content: dict[str, object] = json.loads(answer.read_text(encoding="utf-8"))
+                content: dict[str, Any] = json.loads(answer.read_text(encoding="utf-8"))
                 answer.unlink()
                 return content
             if over:

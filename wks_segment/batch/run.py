@@ -160,9 +160,8 @@ class Batch:
 
     def _check_files(self, jobs: Sequence[Job]) -> None:
         """Nothing is written over but what this batch wrote."""
-        ours = {
-            path for name in records_in(self.folder) for each in read_record(name).values() for path in each.outputs.values()
-        }  # fmt: skip
+        known = [each for name in records_in(self.folder) for each in read_record(name).values()]
+        ours = {path for outcome in known for path in outcome.outputs.values()}
         for job in jobs:
             for path in job.outputs.values():
                 if path not in ours and (self.folder / path).exists():

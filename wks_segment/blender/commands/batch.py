@@ -32,8 +32,8 @@ from ...core.description import Progress
 from .. import files
 from ..errors import UserError
 from .options import (
+    add_cache,
     add_labelling,
-    add_means,
     add_output_settings,
     add_pose_sources,
     add_settings,
@@ -88,7 +88,8 @@ def add_child(commands: Any, answer: Callable[[list[str]], Answer]) -> None:
 
 def program() -> Program:
     """How to start another process of this Blender, or of this Python, with this extension."""
-    addons = [name for name in bpy.context.preferences.addons.keys() if __package__.startswith(f"{name}.")]
+    known = bpy.context.preferences.addons.keys()
+    addons = [name for name in known if __package__.startswith(f"{name}.")]
     if not (bpy.app.binary_path and addons):
         return python_program()
     start = ["--factory-startup"] if "--factory-startup" in sys.argv else []
@@ -98,7 +99,8 @@ def program() -> Program:
 
 def _add_batch(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "inputs", nargs="+", metavar="INPUT", help=f"files, folders, or patterns as 'in/**/*.glb': {', '.join(files.IMPORTERS)}"
+        "inputs", nargs="+", metavar="INPUT",
+        help=f"files, folders, or patterns as 'in/**/*.glb': {', '.join(files.IMPORTERS)}",
     )  # fmt: skip
     parser.add_argument(
         "--output", type=Path, required=True, metavar="DIR", help="a folder for results, list and report"
@@ -125,7 +127,7 @@ def _add_batch(parser: argparse.ArgumentParser) -> None:
         "--scheduler", metavar="tcp://HOST:PORT", help="have the files done by the workers of this Dask scheduler"
     )
     parser.add_argument("--no-thumbnails", action="store_true", help="render no pictures for the report")
-    add_means(parser)
+    add_cache(parser)
 
 
 def _part(text: str) -> tuple[int, int]:

@@ -91,8 +91,8 @@ def add_output_settings(parser: argparse.ArgumentParser) -> None:
     add_settings(parser, OUTPUT_OPTIONS)
 
 
-def add_means(parser: argparse.ArgumentParser) -> None:
-    """What a command may use: nothing of it changes a result."""
+def add_cache(parser: argparse.ArgumentParser) -> None:
+    """Where signatures are kept."""
     parser.add_argument(
         "--cache", type=Path, metavar="DIR",
         help="keep what takes the time in this folder, for the next run with the same poses; several may share it",
@@ -101,6 +101,11 @@ def add_means(parser: argparse.ArgumentParser) -> None:
         "--cache-limit", type=within(float, 0.01, 100_000), default=DISK / 1e9, metavar="GB",
         help=f"what was not used for longest leaves the cache above this size (default: {DISK / 1e9:g})",
     )  # fmt: skip
+
+
+def add_means(parser: argparse.ArgumentParser) -> None:
+    """What a command may use: nothing of it changes a result."""
+    add_cache(parser)
     parser.add_argument(
         "--threads", type=within(int, 1, 256), metavar="N",
         help="poses that are computed side by side (default: as many as there are cores and memory for, at most 4)",
