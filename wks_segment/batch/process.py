@@ -58,9 +58,10 @@ class Program:
 
 
 def python_program() -> Program:
-    """A child by the Python that runs, with the packages that it has."""
-    paths = os.pathsep.join(dict.fromkeys([str(Path(__file__).parents[2]), *filter(None, sys.path)]))
-    return Program((sys.executable, "-m", "wks_segment", COMMAND), (("PYTHONPATH", paths),))
+    """A child by the Python that runs, with this very package."""
+    # Not all of sys.path: Blender's own folders there would hide bpy from who imports it anew.
+    paths = [str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])]
+    return Program((sys.executable, "-m", "wks_segment", COMMAND), (("PYTHONPATH", os.pathsep.join(paths)),))
 
 
 class ChildError(Exception):
