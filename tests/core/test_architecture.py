@@ -37,6 +37,7 @@ CHAIN = [
     "labelling",
     "parts",
     "grouping",
+    "layout",
     "learning",
     "region_atlas",
     "part_notes",

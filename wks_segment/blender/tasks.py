@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..core import Connection, PoseSegmentation, SignatureCache, SpectrumError, SpectrumWarning, Workpiece, connect
+from ..core import Cache, Connection, PoseSegmentation, SpectrumError, SpectrumWarning, Workpiece, connect
 from ..core.description import Progress
 from ..core.memory import available_memory
 from ..core.mesh import FloatArray, IntArray
@@ -97,7 +97,7 @@ def check_limits(model: PoseSegmentation, poses: Sequence[Pose], settings: WKSSe
 
 def learn(
     model: PoseSegmentation, poses: Sequence[Pose], report: Report, progress: Progress,
-    cache: SignatureCache | None = None, workers: int | None = None,
+    cache: Cache | None = None, workers: int | None = None,
 ) -> list[Workpiece]:  # fmt: skip
     """Fit a model to poses; what is known of each pose.
 
@@ -115,7 +115,7 @@ def learn(
     described = describe(model, poses, report, progress, DESCRIBED, cache, workers)
     with report.stage("mixture"):
         try:
-            model.fit(described, lambda stage, share: progress("Learning the segments", share), poses[0].upright)
+            model.fit(described, lambda stage, share: progress("Learning the segments", share), poses[0].upright, cache)
         except ValueError as error:
             raise UserError(f"The segments could not be learned: {error}") from error
     report.tell_of(model)
@@ -124,7 +124,7 @@ def learn(
 
 def describe(
     model: PoseSegmentation, poses: Sequence[Pose], report: Report, progress: Progress, share: float = 1.0,
-    cache: SignatureCache | None = None, workers: int | None = None,
+    cache: Cache | None = None, workers: int | None = None,
 ) -> list[Workpiece]:  # fmt: skip
     """Signature of each pose, to be labelled; poses that are one and the same surface are computed once.
 

@@ -8,7 +8,7 @@ from typing import Literal
 
 import bpy
 
-from ..core import PoseSegmentation, SignatureCache, Workpiece
+from ..core import Cache, PoseSegmentation, Workpiece
 from ..core.description import Progress
 from ..core.mesh import FloatArray, IntArray
 from . import poses as reader
@@ -46,7 +46,7 @@ class Work:
         Whether the model is learned from the poses, and kept in the scene.
     number : int or "auto"
         Segments that the settings asked for when the model was there.
-    cache : SignatureCache
+    cache : Cache
         Asked for signatures, and told of new ones.
     described
         What is known of each pose, once it was computed.
@@ -63,7 +63,7 @@ class Work:
     report: Report
     learns: bool
     number: int | Literal["auto"]
-    cache: SignatureCache
+    cache: Cache
     described: list[Workpiece] = field(default_factory=list)
     first: Work | None = None
     labels: dict[Character, IntArray] = field(default_factory=dict)

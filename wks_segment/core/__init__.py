@@ -1,6 +1,6 @@
 """The method, without Blender: mesh → surface → laplacian → spectrum → signature → mixture → regions → segmentation."""
 
-from .cache import DiskCache, MemoryCache, SignatureCache
+from .cache import Cache, DiskCache, MemoryCache, SignatureCache
 from .intrinsic import delaunay
 from .laplacian import mass_matrix, stiffness_matrix
 from .mesh import TriangleMesh
@@ -15,6 +15,7 @@ from .surface import Connection, Surface, connect, prepare_surface
 from .workpiece import Workpiece
 
 __all__ = [
+    "Cache",
     "Connection",
     "DiskCache",
     "GaussianMixture",
