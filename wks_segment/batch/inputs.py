@@ -54,7 +54,7 @@ def names_of(inputs: Sequence[tuple[Path, Path]]) -> list[str]:
     """A name for the results of each input, with `/` between folders; no two alike, on any system.
 
     The path from the folder in which it was found, without its suffix. Where two are alike: from the folder that all
-    have in common; and if that is not enough, with the suffix.
+    have in common; if that is not enough, with the suffix; and in the end with a number.
     """
     if not inputs:
         return []
@@ -64,7 +64,6 @@ def names_of(inputs: Sequence[tuple[Path, Path]]) -> list[str]:
             path.relative_to(root).with_suffix("").as_posix(),
             (path.relative_to(common or root).with_suffix("")).as_posix(),
             path.relative_to(common or root).as_posix(),
-            path.as_posix().replace(":", "").lstrip("/"),
         )
         for path, root in inputs
     ]
@@ -73,11 +72,25 @@ def names_of(inputs: Sequence[tuple[Path, Path]]) -> list[str]:
         names = [of_input[at] for of_input, at in zip(choices, level, strict=True)]
         # Files of one name but for upper and lower case are one file on Windows and macOS.
         count = Counter(name.casefold() for name in names)
-        alike = [i for i, name in enumerate(names) if count[name.casefold()] > 1 and level[i] < 3]
+        alike = [i for i, name in enumerate(names) if count[name.casefold()] > 1 and level[i] < 2]
         if not alike:
-            return names
+            return _numbered(names)
         for i in alike:
             level[i] += 1
+
+
+def _numbered(names: Sequence[str]) -> list[str]:
+    """Those that are still alike as `name`, `name 2`, …"""
+    found: list[str] = []
+    taken: set[str] = set()
+    for name in names:
+        number, free = 1, name
+        while free.casefold() in taken:
+            number += 1
+            free = f"{name} {number}"
+        taken.add(free.casefold())
+        found.append(free)
+    return found
 
 
 def _absolute(path: Path) -> Path:

@@ -161,10 +161,15 @@ class Batch:
     def _check_files(self, jobs: Sequence[Job]) -> None:
         """Nothing is written over but what this batch wrote."""
         known = [each for name in records_in(self.folder) for each in read_record(name).values()]
-        ours = {path for outcome in known for path in outcome.outputs.values()}
+        owner = {path: outcome.input for outcome in known for path in outcome.outputs.values()}
         for job in jobs:
             for path in job.outputs.values():
-                if path not in ours and (self.folder / path).exists():
+                if owner.get(path, job.input) != job.input:
+                    raise BatchError(
+                        f"{self.folder / path}: this is what came of {owner[path]}, and {job.input} would have the same "
+                        "name: take another --output for other inputs"
+                    )
+                if path not in owner and (self.folder / path).exists():
                     raise BatchError(
                         f"{self.folder / path}: the file is there, but not from this batch: move it away, or take "
                         "another --output"

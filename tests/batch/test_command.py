@@ -1,0 +1,133 @@
+"""`wks_segment batch`: real children, by the command line."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from shapes import creature
+
+from wks_segment.core import PoseSegmentation
+
+ROOT = Path(__file__).resolve().parents[2]
+QUICK = ("--eigenpairs", "30", "--energies", "20", "--segments", "4")
+pytestmark = pytest.mark.usefixtures("needs_bpy")
+
+
+def write(path, bend):
+    mesh = creature(bend, 3)
+    text = [f"v {x} {y} {z}" for x, y, z in mesh.vertices] + [f"f {a} {b} {c}" for a, b, c in mesh.faces + 1]
+    path.write_text("\n".join(text) + "\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Three characters, and a file that is none."""
+    folder = tmp_path_factory.mktemp("in")
+    for i in range(3):
+        write(folder / f"{i}.obj", 0.2 * i)
+    (folder / "broken.glb").write_bytes(b"glTF and no more")
+    return folder
+
+
+def start(*arguments):
+    # One thread here as in children: sums over more of them have other last digits.
+    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    return subprocess.Popen(
+        [sys.executable, "-m", "wks_segment", *map(str, arguments)], cwd=ROOT, env=environment, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+
+
+def run(*arguments):
+    process = start(*arguments)
+    printed, said = process.communicate(timeout=120)
+    return process.returncode, printed, said
+
+
+def lines(folder):
+    path = folder / "batch.jsonl"
+    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+
+
+def wait_for_lines(folder, count, process):
+    until = time.monotonic() + 60
+    while len(lines(folder)) < count and process.poll() is None and time.monotonic() < until:
+        time.sleep(0.02)
+
+
+@pytest.fixture(scope="module")
+def learned(folder, tmp_path_factory):
+    """A batch that learned a model of each."""
+    out = tmp_path_factory.mktemp("learned") / "models"
+    return out, run("batch", "learn", folder, "--output", out, *QUICK, "--no-thumbnails", "--json")
+
+
+def test_learn_makes_a_model_of_each_file(learned, folder, tmp_path):
+    out, (code, printed, said) = learned
+    result = json.loads(printed)
+    assert code == 1, said
+    assert (result["files"], result["done"]) == (4, 3)
+    assert list(result["failed"]) == [str(folder / "broken.glb")]
+    assert "Blender cannot read it" in result["failed"][str(folder / "broken.glb")]
+    assert sorted(path.name for path in out.iterdir()) == ["0.json", "1.json", "2.json", "batch.jsonl", "report.html"]
+    assert "left" in said
+    alone = tmp_path / "alone.json"
+    assert run("learn", folder / "1.obj", "--model", alone, *QUICK)[0] == 0
+    assert alone.read_bytes() == (out / "1.json").read_bytes(), "the same model as without a batch"
+
+
+def test_apply_writes_scenes_and_pictures(learned, folder, tmp_path, needs_rendering):
+    model = learned[0] / "0.json"
+    code, printed, said = run(
+        "batch", "apply", folder / "*.obj", "--output", tmp_path / "out", "--model", model, "--format", "obj",
+        "--cache", tmp_path / "cache", "--processes", 1,
+    )  # fmt: skip
+    assert code == 0, said
+    assert "3 of 3 files done" in printed
+    found = {path.relative_to(tmp_path / "out").as_posix() for path in (tmp_path / "out").rglob("*.*")}
+    assert {"0.obj", "1.obj", "2.obj", "thumbnails/0.png", "thumbnails/2.png", "report.html"} <= found
+    assert len(list((tmp_path / "cache").glob("*.npz"))) == 3
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert 'src="thumbnails/1.png"' in page
+
+
+def test_a_batch_that_was_killed_goes_on(folder, tmp_path):
+    out = tmp_path / "out"
+    command = ("batch", "learn", folder / "*.obj", "--output", out, *QUICK, "--no-thumbnails", "--processes", 1)
+    process = start(*command)
+    wait_for_lines(out, 1, process)
+    process.kill()
+    process.communicate(timeout=60)
+    before = lines(out)
+    assert 1 <= len(before) < 3
+    code, printed, said = run(*command, "--resume", "--json")
+    assert code == 0, said
+    assert json.loads(printed)["now"] == 3 - len(before)
+    assert lines(out)[: len(before)] == before
+    assert {line["name"] for line in lines(out)} == {"0", "1", "2"}
+    assert all(isinstance(PoseSegmentation.load(out / f"{i}.json"), PoseSegmentation) for i in range(3))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--segments", "0"), "must be from"),
+        (("--part", "3/2"), "must be I/N"),
+    ],
+)
+def test_wrong_usage(folder, tmp_path, arguments, said):
+    code, _, printed = run("batch", "learn", folder, "--output", tmp_path / "out", *arguments)
+    assert code == 2
+    assert said in printed
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_is_not_there_is_named(folder, tmp_path):
+    code, _, said = run("batch", "apply", folder, "--output", tmp_path / "out", "--model", tmp_path / "no.json")
+    assert code == 1
+    assert "no.json: there is no such file" in said
