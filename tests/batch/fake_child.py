@@ -17,7 +17,7 @@ calls = []
 
 
 def run(arguments):
-    command, source, *rest = arguments
+    _, source, *rest = arguments
     calls.append(source)
     print('{"error": "junk on standard output"}', flush=True)
     text = Path(source).read_text()

@@ -116,7 +116,7 @@ def test_what_changed_is_done_again(batch, tmp_path):
 def test_a_folder_with_something_in_it_is_refused(batch, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "a.txt").write_text("mine")
-    with pytest.raises(BatchError, match="not empty.*--resume"):
+    with pytest.raises(BatchError, match=r"not empty.*--resume"):
         batch({"a": "one"}).run(quiet)
     with pytest.raises(BatchError, match="no batch that could be resumed"):
         batch({"a": "one"}, resume=True).run(quiet)
@@ -176,7 +176,7 @@ def test_ctrl_c_ends_the_children_and_says_how_to_go_on(batch, tmp_path):
             pids.append(int((tmp_path / "out" / "a.txt").read_text().split()[1]))
             os.kill(os.getpid(), signal.SIGINT)
 
-    with pytest.raises(BatchError, match="ended by the user with 1 of 3 files done.*--resume"):
+    with pytest.raises(BatchError, match=r"ended by the user with 1 of 3 files done.*--resume"):
         batch({"a": "one", "b": "sleep 50", "c": "sleep 50"}).run(interrupt)
     with pytest.raises(ProcessLookupError):
         os.kill(pids[0], 0)

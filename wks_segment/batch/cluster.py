@@ -44,7 +44,7 @@ def outcomes(jobs: Sequence[Job], scheduler: str, limits: Limits, unfinished: Pa
     except (OSError, TimeoutError, ValueError) as error:
         raise BatchError(f"{scheduler}: no Dask scheduler answers there: {error}") from error
     name = f"wks_segment-{uuid.uuid4().hex}"
-    with client:
+    with client, client.as_current():
         client.register_plugin(_Children(name, limits), name=name)
         try:
             futures = {

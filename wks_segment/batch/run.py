@@ -166,8 +166,8 @@ class Batch:
             for path in job.outputs.values():
                 if owner.get(path, job.input) != job.input:
                     raise BatchError(
-                        f"{self.folder / path}: this is what came of {owner[path]}, and {job.input} would have the same "
-                        "name: take another --output for other inputs"
+                        f"{self.folder / path}: this is what came of {owner[path]}, and {job.input} would have the "
+                        "same name: take another --output for other inputs"
                     )
                 if path not in owner and (self.folder / path).exists():
                     raise BatchError(
