@@ -26,6 +26,7 @@ CHAIN = [
     "spectrum",
     "signature",
     "mixture",
+    "explained",
     "smoothing",
     "regions",
     "shape",
@@ -43,6 +44,7 @@ CHAIN = [
     "part_notes",
     "model_file",
     "segmentation",
+    "ranking",
 ]
 
 

@@ -18,7 +18,7 @@ from ..core.description import Progress
 from ..core.memory import available_memory
 from ..core.mesh import FloatArray, IntArray
 from ..core.segmentation import DESCRIBED
-from . import parts, segments
+from . import models, parts, segments
 from . import poses as reader
 from .bodies import Body
 from .characters import Character
@@ -292,10 +292,7 @@ def stored_model(settings: WKSSegmentSettings) -> PoseSegmentation:
     """The model that was learned in or loaded into this scene; UserError if there is none."""
     if not settings.model:
         raise UserError("No model yet: learn one with Learn and Segment, or load one from a file")
-    try:
-        return PoseSegmentation.from_json(settings.model)
-    except ValueError as error:
-        raise UserError(f"The model in this file cannot be used: {error}") from error
+    return models.from_text(settings.model)
 
 
 def filled(labels: IntArray, body: Body) -> IntArray:

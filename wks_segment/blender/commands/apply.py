@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from ...core.description import Progress
-from .. import files, tasks
+from .. import files, models, tasks
 from ..errors import UserError
 from ..report import Report
-from .common import cache_of, check_outputs, label, load_model, read_poses, result_of, settings_of
+from .common import cache_of, check_outputs, label, read_poses, result_of, settings_of
 from .options import add_labelling, add_means, add_outputs, add_poses
 
 
@@ -30,18 +30,17 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
         raise UserError("apply has nothing to write: give --output, --render or both")
     check_outputs(options)
     cache = cache_of(options)
-    model = load_model(options.model)
+    model = models.loaded(options.model)
     report = Report([])
     report.tell_of(model)
     poses = read_poses(options, report)
     settings = settings_of(options)
-    settings.keep_notes(model.part_notes_)
+    models.add(settings, model, options.model.stem, [f"From {options.model.name}", f"{model.n_segments_} segments"])
     if options.smoothness is not None:
         model.smoothness = settings.smoothness
     tasks.check_limits(model, poses, settings)
     described = tasks.describe(model, poses, report, progress, cache=cache, workers=options.threads)
     label(model, poses, described, settings, options, report, progress)
-    settings.keep_model(model, [f"From {options.model.name}", f"{model.n_segments_} segments"])
     if options.output:
         files.save_scene(options.output)
     return result_of(options, report)

@@ -10,14 +10,14 @@ import bpy
 import numpy as np
 
 from ...core.description import Progress
-from .. import files, tasks
+from .. import files, models, tasks
 from ..bake import bake_id_maps
 from ..errors import UserError
 from ..id_map import save
 from ..labels import labels_on
 from ..report import Report
 from ..tasks import Wanted
-from .common import check_picture, load_model, read_poses, result_of, settings_of
+from .common import check_picture, read_poses, result_of, settings_of
 from .options import BAKE_OPTIONS, add_labelling, add_settings
 
 
@@ -54,7 +54,7 @@ def _bake(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     if options.model or any(of_object is None for of_object in there):
         if not (options.model or settings.model):
             raise UserError(f"{options.files[0]}: there are no segments in it: give the --model that finds them")
-        model = load_model(options.model) if options.model else tasks.stored_model(settings)
+        model = models.loaded(options.model) if options.model else tasks.stored_model(settings)
         if options.smoothness is not None:
             model.smoothness = settings.smoothness
         tasks.check_limits(model, poses, settings)

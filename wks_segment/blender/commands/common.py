@@ -164,16 +164,6 @@ def save_model(model: PoseSegmentation, path: Path) -> None:
         raise UserError(f"{path}: the model could not be written: {error.strerror or error}") from error
 
 
-def load_model(path: Path) -> PoseSegmentation:
-    """Read a model from a file; UserError if it cannot be read or used."""
-    try:
-        return PoseSegmentation.load(path)
-    except FileNotFoundError:
-        raise UserError(f"{path}: there is no such file") from None
-    except (ValueError, OSError) as error:
-        raise UserError(f"{path}: {getattr(error, 'strerror', None) or error}") from error
-
-
 def result_of(options: argparse.Namespace, report: Report) -> dict[str, Any]:
     """What a command prints: one JSON object."""
     outputs = {name: getattr(options, name, None) for name in ("model", "output", "render")}

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core.description import Progress
-from .. import files, tasks
+from .. import files, models, tasks
 from ..report import Report, pose_warnings, segment_warnings
 from .common import cache_of, check_outputs, label, read_poses, result_of, save_model, settings_of
 from .options import add_means, add_outputs, add_poses, add_settings
@@ -43,10 +43,11 @@ def _segment(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     described = tasks.learn(model, poses, report, progress, cache, options.threads)
     if options.model:
         save_model(model, options.model)
+    models.aside(settings)
     if options.output or options.render:
         label(model, poses, described, settings, options, report, progress, renumbered=True)
         report.warnings += segment_warnings(model, report)
-    settings.keep_model(model, report.facts)
+    models.keep(settings, model, report.facts, poses[0].character.name, add=True)
     if options.output:
         files.save_scene(options.output)
     report.warnings += pose_warnings(poses, from_frames=options.frames is not None)

@@ -1,0 +1,175 @@
+"""Which model fits a shape: the paper's retrieval (section 5), between models of any settings.
+
+A shape is of the class under whose mixture its signatures are likeliest. What is compared is
+`PoseSegmentation.comparable_score`: neither the length of a signature counts, nor what enters the mixture. What each
+model gives to its own learned poses when they are left out tells what is too little for any class.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from .mesh import FloatArray, IntArray
+from .pose_signature import PoseSignature
+from .segmentation import PoseSegmentation
+
+Verdict = Literal["sure", "unsure", "nothing fits"]
+WIDTH = 0.1
+"""Difference of two comparable scores at which one model is e times as probable as the other."""
+SURE = 0.95
+"""Probability of the best model from which on it is sure."""
+TOLERATED = 1.0
+"""How far a score may lie below those that a model usually gives, …"""
+SPREADS = 4.0
+"""… or how many of their standard deviations, if that is more."""
+
+
+@dataclass(frozen=True)
+class Rank:
+    """A model in a ranking.
+
+    Attributes
+    ----------
+    index : int
+        Of the model among those that were ranked.
+    score : float
+        `PoseSegmentation.comparable_score`, mean over the poses.
+    probability : float
+        Among the models of the ranking.
+    fits : bool
+        Whether the score is not far below those of the model's own poses.
+    """
+
+    index: int
+    score: float
+    probability: float
+    fits: bool
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """Models, best first, and how sure that is."""
+
+    ranks: tuple[Rank, ...]
+    verdict: Verdict
+
+    @property
+    def best(self) -> Rank:
+        """The model that fits best."""
+        return self.ranks[0]
+
+
+@dataclass(frozen=True)
+class Retrieval:
+    """What came of queries of several classes.
+
+    Attributes
+    ----------
+    names : list of str
+        Of the classes.
+    confusion : (c, c) int array
+        Queries of class i that were taken for class j.
+    verdicts : dict
+        For each verdict the numbers of right and of wrong answers.
+    """
+
+    names: list[str]
+    confusion: IntArray
+    verdicts: Mapping[str, tuple[int, int]]
+
+    @property
+    def right(self) -> int:
+        """Queries that were taken for what they are."""
+        return int(np.trace(self.confusion))
+
+    @property
+    def asked(self) -> int:
+        """Queries."""
+        return int(self.confusion.sum())
+
+    @property
+    def rate(self) -> float:
+        """Share of right answers."""
+        return self.right / self.asked
+
+
+def described_alike(models: Sequence[PoseSegmentation]) -> list[list[int]]:
+    """Indices of models together that take the same signature of a pose."""
+    together: dict[tuple[object, ...], list[int]] = {}
+    for i, model in enumerate(models):
+        together.setdefault((*sorted(model.describing().items()), model.pieces), []).append(i)
+    return list(together.values())
+
+
+def rank(models: Sequence[PoseSegmentation], poses: Sequence[Sequence[PoseSignature]]) -> Ranking:
+    """Say which models fit a shape.
+
+    Parameters
+    ----------
+    models
+        Fitted.
+    poses
+        For each model the poses of the shape, described by it, or by one that `described_alike` puts it together with.
+
+    Raises
+    ------
+    ValueError
+        If there is no model or no pose, or a signature is not by a model's settings.
+    """
+    if not models or len(models) != len(poses) or not all(len(of_model) for of_model in poses):
+        raise ValueError(f"there are {len(models)} models, and poses for {sum(map(bool, map(len, poses)))} of them")
+    scores = np.array([
+        np.mean([model.comparable_score(pose) for pose in of_model])
+        for model, of_model in zip(models, poses, strict=True)
+    ])  # fmt: skip
+    return ranking_of(scores, [model.usual_scores_ for model in models])
+
+
+def ranking_of(scores: FloatArray, usual: Sequence[FloatArray]) -> Ranking:
+    """Of models' scores for a shape, and those that each usually gives (none: any score fits)."""
+    weights = np.exp((scores - scores.max()) / WIDTH)
+    fits = [score >= least_usual(of_model) for score, of_model in zip(scores, usual, strict=True)]
+    ranks = tuple(
+        Rank(int(i), float(scores[i]), float(weights[i] / weights.sum()), bool(fits[i]))
+        for i in np.argsort(-scores, kind="stable")
+    )
+    if not ranks[0].fits:
+        return Ranking(ranks, "nothing fits")
+    return Ranking(ranks, "sure" if ranks[0].probability >= SURE else "unsure")
+
+
+def least_usual(usual: FloatArray) -> float:
+    """The score below which a shape is of another class, given those of a model's own poses."""
+    if not len(usual):
+        return -np.inf
+    return float(np.mean(usual) - max(TOLERATED, SPREADS * float(np.std(usual, ddof=1)) if len(usual) > 1 else 0.0))
+
+
+def spread_evenly(count: int, n_learned: int) -> list[int]:
+    """Which of `count` shapes in a row are learned from: at equal steps, the first among them."""
+    return [i * count // n_learned for i in range(n_learned)]
+
+
+def retrieve(models: Mapping[str, PoseSegmentation], queries: Mapping[str, Sequence[PoseSignature]]) -> Retrieval:
+    """Ask for the class of each query.
+
+    Parameters
+    ----------
+    models
+        Of each class, fitted, all with the same settings.
+    queries
+        Shapes of each class that were not learned, described by these settings.
+    """
+    names = list(models)
+    confusion = np.zeros((len(names), len(names)), dtype=np.int64)
+    verdicts = {verdict: [0, 0] for verdict in ("sure", "unsure", "nothing fits")}
+    for i, name in enumerate(names):
+        for query in queries[name]:
+            found = rank(list(models.values()), [[query]] * len(names))
+            confusion[i, found.best.index] += 1
+            verdicts[found.verdict][int(found.best.index != i)] += 1
+    return Retrieval(names, confusion, {verdict: (right, wrong) for verdict, (right, wrong) in verdicts.items()})
