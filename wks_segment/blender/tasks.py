@@ -13,7 +13,16 @@ import bpy
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..core import Cache, Connection, PoseSegmentation, SpectrumError, SpectrumWarning, Workpiece, connect
+from ..core import (
+    Cache,
+    Connection,
+    PoseSegmentation,
+    SignatureCache,
+    SpectrumError,
+    SpectrumWarning,
+    Workpiece,
+    connect,
+)
 from ..core.description import Progress
 from ..core.memory import available_memory
 from ..core.mesh import FloatArray, IntArray
@@ -124,7 +133,7 @@ def learn(
 
 def describe(
     model: PoseSegmentation, poses: Sequence[Pose], report: Report, progress: Progress, share: float = 1.0,
-    cache: Cache | None = None, workers: int | None = None,
+    cache: SignatureCache | None = None, workers: int | None = None,
 ) -> list[Workpiece]:  # fmt: skip
     """Signature of each pose, to be labelled; poses that are one and the same surface are computed once.
 

@@ -162,8 +162,10 @@ class Plan:
             counts = [self._n_components(each) for each in self.covariance_types]
             key = layout_key(self.poses, [*settings, *zip(self.covariance_types, counts, strict=True)])
             kept = cache.arrays(key)
-            if kept is not None:
-                return Layout.of_arrays(self.poses, kept)
+            try:
+                return Layout.of_arrays(self.poses, kept or {})
+            except (KeyError, ValueError):  # there is none, or it is none
+                mixing(0.0)
         mixtures = self._mixtures(mixing)
         with threadpool_limits(1, "blas"):  # on arrays this small, threads wait for each other
             layout = Layout.of(self.poses, mixtures, standardised, grouping)
