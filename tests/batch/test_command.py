@@ -113,17 +113,10 @@ def test_a_batch_that_was_killed_goes_on(folder, tmp_path):
     assert all(isinstance(PoseSegmentation.load(out / f"{i}.json"), PoseSegmentation) for i in range(3))
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("--segments", "0"), "must be from"),
-        (("--part", "3/2"), "must be I/N"),
-    ],
-)
-def test_wrong_usage(folder, tmp_path, arguments, said):
-    code, _, printed = run("batch", "learn", folder, "--output", tmp_path / "out", *arguments)
+def test_wrong_usage(folder, tmp_path):
+    code, _, printed = run("batch", "learn", folder, "--output", tmp_path / "out", "--part", "3/2")
     assert code == 2
-    assert said in printed
+    assert "must be I/N" in printed
     assert not (tmp_path / "out").exists()
 
 

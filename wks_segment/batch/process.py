@@ -37,6 +37,7 @@ ONE_THREAD = {
     "MKL_NUM_THREADS": "1",
     "BLIS_NUM_THREADS": "1",
     "VECLIB_MAXIMUM_THREADS": "1",
+    "LP_NUM_THREADS": "1",  # Mesa's, where pictures are drawn without a graphics card
 }
 """Environment of children: there is one for each core, and libraries read these when they are loaded."""
 
