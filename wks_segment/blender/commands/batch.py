@@ -88,12 +88,12 @@ def add_child(commands: Any, answer: Callable[[list[str]], Answer]) -> None:
 
 def program() -> Program:
     """How to start another process of this Blender, or of this Python, with this extension."""
-    known = bpy.context.preferences.addons.keys()
-    addons = [name for name in known if __package__.startswith(f"{name}.")]
-    if not (bpy.app.binary_path and addons):
+    # The preferences do not tell: they lack what --addons enabled.
+    addon, inside, _ = __package__.partition(".wks_segment.blender")
+    if not (bpy.app.binary_path and inside):
         return python_program()
     start = ["--factory-startup"] if "--factory-startup" in sys.argv else []
-    enabled = ["--threads", "1", "--addons", addons[0]]
+    enabled = ["--threads", "1", "--addons", addon]
     return Program((bpy.app.binary_path, "--background", *start, *enabled, "--command", "wks_segment", COMMAND))
 
 
