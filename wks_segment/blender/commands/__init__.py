@@ -8,10 +8,10 @@ import sys
 
 from ..errors import UserError
 from ..terminal import only_result_on_stdout, terminal_progress
-from . import apply, bake, demo, segment
+from . import apply, bake, demo, rank, segment
 from .common import text_of
 
-COMMANDS = (segment, apply, bake, demo)
+COMMANDS = (segment, apply, rank, bake, demo)
 """Modules that add a command each, in the order of the help."""
 
 

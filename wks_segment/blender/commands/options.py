@@ -44,9 +44,9 @@ AUTOMATIC = {"n_segments": "auto_segments"}
 """Numbers that can be left open by the word "auto", and the settings that do it."""
 
 
-def add_poses(parser: argparse.ArgumentParser) -> None:
+def add_poses(parser: argparse.ArgumentParser, nargs: str = "+") -> None:
     """Files, and where the poses in them are."""
-    parser.add_argument("files", type=Path, nargs="+", metavar="FILE", help=", ".join(files.IMPORTERS))
+    parser.add_argument("files", type=Path, nargs=nargs, metavar="FILE", help=", ".join(files.IMPORTERS))
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
         "--frames", type=_frames, metavar="FIRST:LAST:COUNT",
