@@ -81,13 +81,16 @@ def _classes(folder: Path) -> list[tuple[str, list[Path]]]:
     found: list[tuple[str, list[Path]]] = []
     for path in sorted(folder.iterdir(), key=_natural):
         if path.is_dir():
-            shapes = [
-                shape for shape in sorted(path.iterdir(), key=_natural) if shape.suffix.lower() in files.IMPORTERS
-            ]
+            shapes = [shape for shape in sorted(path.iterdir(), key=_natural) if _known(shape)]
             if shapes:
-                yield path.name, shapes
-        elif path.suffix.lower() in files.IMPORTERS:
-            yield path.stem, [path]
+                found.append((path.name, shapes))
+        elif _known(path):
+            found.append((path.stem, [path]))
+    return found
+
+
+def _known(path: Path) -> bool:
+    return path.suffix.lower() in files.IMPORTERS
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:

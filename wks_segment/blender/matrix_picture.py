@@ -14,7 +14,7 @@ from .picture import add_text, paint, picture_scene, render
 
 CELL = 72
 """Pixels of a cell."""
-LETTERS, LETTER = 0.36, 0.21
+LETTERS, LETTER = 0.36, 0.17
 """Height of letters and about the width of one, in cells."""
 MARGIN = 0.4
 """Around all, in cells."""
