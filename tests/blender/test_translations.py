@@ -31,7 +31,7 @@ def shown(classes):
             yield "*", kind.description
             if cls.bl_idname != "wks_segment.add_preset":
                 yield from (("*", text) for text in texts_of(kind.properties))
-        elif issubclass(cls, bpy.types.PropertyGroup):
+        elif issubclass(cls, bpy.types.PropertyGroup | bpy.types.AddonPreferences):
             yield from (("*", text) for text in texts_of(cls.bl_rna.properties))
         else:
             yield "*", getattr(cls, "bl_label", "")

@@ -80,6 +80,7 @@ def _figure(outcome: Outcome) -> str:
     said = [f"{outcome.result['segments']} segments"] if "segments" in outcome.result else []
     said += [f"{len(poses)} pose{'s' * (len(poses) != 1)}"] if (poses := outcome.result.get("poses")) else []
     said += [f"best model: {outcome.result['best']}"] if outcome.result.get("best") else []
+    said += [str(ranking.get("says")) for ranking in outcome.result.get("rankings", ())]
     said += [f"{outcome.seconds:.1f} seconds"]
     warnings = [
         f'<br><small class="warning">{escape(str(each))}</small>' for each in outcome.result.get("warnings", ())

@@ -11,7 +11,7 @@ from pathlib import Path
 from .job import Job, Outcome
 from .process import Child, ChildError
 
-KEPT = ("segments", "parts", "poses", "certainty", "models", "best", "warnings", "notes")
+KEPT = ("segments", "parts", "poses", "certainty", "rankings", "best", "verdict", "warnings", "notes")
 """Of what a command prints, what the list keeps."""
 
 

@@ -80,7 +80,7 @@ def of_files(paths: Mapping[str, Path], report: Report) -> list[Candidate]:
 
 def rank_poses(
     candidates: Sequence[Candidate], poses: Sequence[Pose], report: Report, progress: Progress,
-    cache: SignatureCache | None = None,
+    cache: SignatureCache | None = None, workers: int | None = None,
 ) -> Ranking:  # fmt: skip
     """Say which models fit poses of one character; UserError if a pose cannot be described."""
     described: dict[int, list[PoseSignature]] = {}
@@ -90,7 +90,7 @@ def rank_poses(
         def tick(stage: str, share: float, begun: int = number) -> None:
             progress(stage, (begun + share) / len(together))
 
-        works = tasks.describe(candidates[alike[0]].model, poses, report, tick, cache=cache)
+        works = tasks.describe(candidates[alike[0]].model, poses, report, tick, cache=cache, workers=workers)
         described |= {i: [work.pose for work in works] for i in alike}
     with report.stage("rank"):
         return rank([candidate.model for candidate in candidates], [described[i] for i in range(len(candidates))])

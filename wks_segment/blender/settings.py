@@ -286,7 +286,9 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         name="Active Model", description="The model in use: labels, names and colors are its own", min=0, max=9999,
         update=followed,
     )  # fmt: skip
-    used_model: IntProperty(options={"HIDDEN"}, description="Row of the model whose text is below", default=-1)
+    used_model: IntProperty(
+        options={"HIDDEN"}, description="Row of the model whose text is below", default=-1, min=-1, max=9999
+    )
     replace_model: BoolProperty(
         name="Replace",
         description="Learn and Segment puts what it learns in the place of the active model. Otherwise it adds one",

@@ -18,13 +18,14 @@ from .pose_signature import PoseSignature
 from .segmentation import PoseSegmentation
 
 Verdict = Literal["sure", "unsure", "nothing fits"]
-WIDTH = 0.1
-"""Difference of two comparable scores at which one model is e times as probable as the other."""
+WIDTH = 0.15
+"""Difference of two comparable scores at which one model is e times as probable as the other: so that, of answers with
+some probability, about that share is right (Princeton classes, five choices of what is learned)."""
 SURE = 0.95
 """Probability of the best model from which on it is sure."""
-TOLERATED = 1.0
-"""How far a score may lie below those that a model usually gives, …"""
-SPREADS = 4.0
+TOLERATED = 0.5
+"""How far a score may lie below those that a model usually gives: few shapes of a class do, …"""
+SPREADS = 3.0
 """… or how many of their standard deviations, if that is more."""
 
 

@@ -9,10 +9,10 @@ import sys
 from ...batch import Answer
 from ..errors import UserError
 from ..terminal import only_result_on_stdout, terminal_progress
-from . import apply, bake, batch, demo, segment
+from . import apply, bake, batch, demo, rank, segment
 from .common import text_of
 
-COMMANDS = (segment, apply, bake, batch, demo)
+COMMANDS = (segment, apply, rank, bake, batch, demo)
 """Modules that add a command each, in the order of the help."""
 
 
@@ -36,10 +36,9 @@ def answer(arguments: list[str]) -> Answer:
     """Run one command of a batch in this process."""
     try:
         options = _parser().parse_args(arguments)
+        return Answer(options.run(options, lambda stage, share: None))
     except SystemExit:  # argparse, which has printed why
         return Answer(None, f"wrong usage: {' '.join(arguments)}")
-    try:
-        return Answer(options.run(options, lambda stage, share: None))
     except UserError as error:
         return Answer(None, str(error))
 

@@ -34,6 +34,7 @@ from ..errors import UserError
 from .options import (
     add_cache,
     add_labelling,
+    add_model,
     add_output_settings,
     add_pose_sources,
     add_settings,
@@ -57,7 +58,7 @@ def add(commands: Any) -> None:
     learn.set_defaults(run=_run, jobs_of=_learning)
     apply = kinds.add_parser("apply", help="the parts that a model finds in each file")
     _add_batch(apply)
-    apply.add_argument("--model", type=Path, required=True, help="a model that learn or segment wrote")
+    add_model(apply)
     apply.add_argument(
         "--format", choices=[suffix[1:] for suffix in files.EXPORTERS], default="blend",
         help="of the files that are written (default: blend)",
@@ -66,6 +67,12 @@ def add(commands: Any) -> None:
     add_labelling(apply)
     add_output_settings(apply)
     apply.set_defaults(run=_run, jobs_of=_applying)
+    rank = kinds.add_parser("rank", help="which of several models fits each file")
+    _add_batch(rank)
+    rank.add_argument("--models", type=Path, required=True, metavar="DIR", help="folder of the models to compare")
+    add_pose_sources(rank)
+    add_settings(rank)
+    rank.set_defaults(run=_run, jobs_of=_ranking)
     report = kinds.add_parser("report", help="put the lists of all parts of a batch into one, and write its report")
     report.add_argument("--output", type=Path, required=True, metavar="DIR", help="the folder of the batch")
     report.set_defaults(run=_report)
@@ -180,10 +187,26 @@ def _learning(options: argparse.Namespace) -> tuple[str, list[str], dict[str, st
 
 
 def _applying(options: argparse.Namespace) -> tuple[str, list[str], dict[str, str], list[str]]:
-    if not options.model.is_file():
-        raise BatchError(f"{options.model}: there is no such file")
     outputs = {"--output": "{}." + options.format} | _thumbnail(options)
-    return "apply", [*as_arguments(options), f"--model={options.model.resolve()}"], outputs, [content_of(options.model)]
+    arguments, contents = _known_models(options.model, options.models)
+    return "apply", [*as_arguments(options), *arguments], outputs, contents
+
+
+def _ranking(options: argparse.Namespace) -> tuple[str, list[str], dict[str, str], list[str]]:
+    arguments, contents = _known_models(None, options.models)
+    return "rank", [*as_arguments(options), *arguments], {}, contents
+
+
+def _known_models(model: Path | None, folder: Path | None) -> tuple[list[str], list[str]]:
+    """Arguments for a model or a folder of models, and what they hold."""
+    if model is not None:
+        if not model.is_file():
+            raise BatchError(f"{model}: there is no such file")
+        return [f"--model={model.resolve()}"], [content_of(model)]
+    assert folder is not None
+    if not folder.is_dir():
+        raise BatchError(f"{folder}: there is no such folder")
+    return [f"--models={folder.resolve()}"], [content_of(folder)]
 
 
 def _thumbnail(options: argparse.Namespace) -> dict[str, str]:

@@ -11,7 +11,7 @@ import bpy
 
 from ...core import DiskCache, PartNotes, PoseSegmentation
 from ...core.description import Progress
-from .. import files, parts, tasks
+from .. import files, models, parts, tasks
 from .. import poses as reader
 from ..characters import Character, armature_of, group, mesh_objects
 from ..edits import merged
@@ -19,6 +19,7 @@ from ..errors import UserError
 from ..picture import Tile, render_poses
 from ..pose_library import read_actions
 from ..poses import Pose
+from ..ranking import Candidate, of_files
 from ..report import Report
 from ..settings import WKSSegmentSettings
 from ..tasks import Wanted
@@ -49,6 +50,21 @@ def cache_of(options: argparse.Namespace) -> DiskCache | None:
         return DiskCache(options.cache, round(1e9 * options.cache_limit))
     except OSError as error:
         raise UserError(f"{options.cache}: it cannot be a cache: {error.strerror or error}") from error
+
+
+def candidates_in(folder: Path, report: Report) -> list[Candidate]:
+    """The models in a folder; UserError if there is none."""
+    if not folder.is_dir():
+        raise UserError(f"{folder}: there is no such folder")
+    candidates = of_files(models.in_folder(folder), report)
+    if not candidates:
+        raise UserError(f"{folder}: there is no model in this folder that can be used")
+    return candidates
+
+
+def largest(candidates: Sequence[Candidate]) -> PoseSegmentation:
+    """The model whose signature takes most."""
+    return max((each.model for each in candidates), key=lambda model: model.n_eigenpairs)
 
 
 def read_poses(options: argparse.Namespace, report: Report) -> list[Pose]:

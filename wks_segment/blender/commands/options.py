@@ -50,9 +50,9 @@ AUTOMATIC = {"n_segments": "auto_segments"}
 """Numbers that can be left open by the word "auto", and the settings that do it."""
 
 
-def add_poses(parser: argparse.ArgumentParser) -> None:
+def add_poses(parser: argparse.ArgumentParser, nargs: str = "+") -> None:
     """Files, and where the poses in them are."""
-    parser.add_argument("files", type=Path, nargs="+", metavar="FILE", help=", ".join(files.IMPORTERS))
+    parser.add_argument("files", type=Path, nargs=nargs, metavar="FILE", help=", ".join(files.IMPORTERS))
     add_pose_sources(parser)
 
 
@@ -110,6 +110,13 @@ def add_means(parser: argparse.ArgumentParser) -> None:
         "--threads", type=within(int, 1, 256), metavar="N",
         help="poses that are computed side by side (default: as many as there are cores and memory for, at most 4)",
     )  # fmt: skip
+
+
+def add_model(parser: argparse.ArgumentParser) -> None:
+    """Which model is applied."""
+    model = parser.add_mutually_exclusive_group(required=True)
+    model.add_argument("--model", type=Path, help="a model that learn or segment wrote")
+    model.add_argument("--models", type=Path, metavar="DIR", help="a folder of models, of which the best one is taken")
 
 
 def add_labelling(parser: argparse.ArgumentParser) -> None:
