@@ -96,6 +96,22 @@ def test_apply_writes_scenes_and_pictures(learned, folder, tmp_path, needs_rende
     assert 'src="thumbnails/1.png"' in page
 
 
+def test_the_best_of_several_models_is_found_and_applied(learned, folder, tmp_path):
+    common = ("--models", learned[0], "--cache", tmp_path / "cache", "--no-thumbnails")
+    code, _, said = run("batch", "rank", folder / "[02].obj", "--output", tmp_path / "ranked", *common)
+    assert code == 0, said
+    for line in lines(tmp_path / "ranked"):
+        (ranking,) = line["result"]["rankings"]
+        assert ranking["models"][0]["name"] == line["name"], "the model that was learned from it"
+        assert line["outputs"] == {}
+    code, _, said = run("batch", "apply", folder / "2.obj", "--output", tmp_path / "out", "--format", "glb", *common)
+    assert code == 0, said
+    assert [line["result"]["best"] for line in lines(tmp_path / "out")] == ["2"]
+    assert (tmp_path / "out" / "2.glb").is_file()
+    code, _, said = run("batch", "rank", folder, "--output", tmp_path / "no", "--models", tmp_path / "nowhere")
+    assert (code, "nowhere: there is no such folder" in said) == (1, True)
+
+
 def test_a_batch_that_was_killed_goes_on(folder, tmp_path):
     out = tmp_path / "out"
     command = ("batch", "learn", folder / "*.obj", "--output", out, *QUICK, "--no-thumbnails", "--processes", 1)
@@ -118,9 +134,3 @@ def test_wrong_usage(folder, tmp_path):
     assert code == 2
     assert "must be I/N" in printed
     assert not (tmp_path / "out").exists()
-
-
-def test_what_is_not_there_is_named(folder, tmp_path):
-    code, _, said = run("batch", "apply", folder, "--output", tmp_path / "out", "--model", tmp_path / "no.json")
-    assert code == 1
-    assert "no.json: there is no such file" in said

@@ -65,6 +65,20 @@ def test_core_knows_neither_blender_nor_the_other_rooms(path):
         assert level <= 1, f"{path.name} reaches out of core for {module}"
 
 
+@pytest.mark.parametrize("path", sorted((PACKAGE / "batch").glob("*.py")), ids=lambda path: path.stem)
+def test_batch_uses_core_only(path):
+    """What it runs is a command line."""
+    for level, module in imports(path):
+        assert module.split(".")[0] not in BLENDERS_OWN | {"wks_segment"}, f"{path.name} imports {module}"
+        assert level <= 1 or (level == 2 and module.split(".")[0] == "core"), f"{path.name} imports {module}"
+
+
+def test_only_the_command_line_uses_batch():
+    for path in (PACKAGE / "blender").rglob("*.py"):
+        if path.parent.name != "commands":
+            assert not any(module.split(".")[0] == "batch" for _, module in imports(path)), path
+
+
 @pytest.mark.parametrize("name", CHAIN)
 def test_core_points_one_way(name):
     """A module uses only those that come before it on the way from mesh to segments."""
