@@ -82,7 +82,7 @@ def main() -> None:
         failed = "; ".join(f"{Path(path).name}: {reason[:60]}" for path, reason in result["failed"].items())
         print(
             table_row([
-                result.get("name", NAMES[name]), f"{seconds:.0f}", f"{60 * options.files / seconds:.1f}",
+                result.get("name") or NAMES[name], f"{seconds:.0f}", f"{60 * options.files / seconds:.1f}",
                 f"{first / seconds:.2f}", str(result["done"]), failed, str(same),
             ]),
             flush=True,
