@@ -156,6 +156,7 @@ def cached(characters: list[Path], output: Path) -> None:
     from wks_segment.blender.files import open_files
     from wks_segment.blender.poses import own_frames, read_frames
     from wks_segment.blender.report import Report
+    from wks_segment.blender.terminal import only_result_on_stdout
     from wks_segment.core import DiskCache, PoseSegmentation
 
     wks_segment.blender.register()
@@ -163,11 +164,12 @@ def cached(characters: list[Path], output: Path) -> None:
     shares = []
     cache = DiskCache(output / "cache")
     for path in characters:
-        (objects,) = open_files([path])
-        if not mesh_objects(objects):
-            continue
-        (character,) = characters_in(path, objects, None)
-        poses = read_frames(bpy.context, character, own_frames(bpy.context.scene, character, CACHED_FRAMES))
+        with only_result_on_stdout():
+            (objects,) = open_files([path])
+            if not mesh_objects(objects):
+                continue
+            (character,) = characters_in(path, objects, None)
+            poses = read_frames(bpy.context, character, own_frames(bpy.context.scene, character, CACHED_FRAMES))
         seconds = []
         for number in (FIRST, SECOND):
             begun = time.monotonic()
