@@ -163,16 +163,15 @@ def test_import_adds_and_export_writes_the_one_in_use(two, tmp_path):
 
 def test_what_the_list_does_can_be_undone(two):
     bpy.ops.ed.undo_push(message="two")
-    first, second = two.models[0].model, two.model
-    for change in (OPS.remove_model, OPS.duplicate_model, lambda: OPS.use_model(name=names(two)[0])):
-        change()
+    first, second, called = two.models[0].model, two.model, names(two)
+    for change, options in ((OPS.remove_model, {}), (OPS.duplicate_model, {}), (OPS.use_model, {"name": called[0]})):
+        assert change(**options) == {"FINISHED"}
         bpy.ops.ed.undo_push(message="changed")
         bpy.ops.ed.undo()
         settings = bpy.context.scene.wks_segment
         assert (len(settings.models), settings.used_model, settings.active_model) == (2, 1, 1)
         assert (settings.models[0].model, settings.model) == (first, second)
         assert settings.notes().names == {0: "Cap"}
-        two = settings
 
 
 def test_learning_is_undone_with_its_row(poses, settings):
