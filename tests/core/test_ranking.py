@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from shapes import creature
+from shapes import creature, icosphere
 
 from wks_segment.core import PoseSegmentation, TriangleMesh, described_alike, rank, retrieve
 from wks_segment.core.explained import left_out_likelihoods, likely_mean
@@ -61,9 +61,7 @@ def test_models_of_other_settings_are_comparable(models, other):
 
 
 def test_a_shape_of_no_class_fits_nothing(models):
-    flat = creature(0.2, 3)
-    flat = TriangleMesh(flat.vertices * (1.0, 0.05, 1.0), flat.faces)
-    assert ranked(models, flat).verdict == "nothing fits"
+    assert ranked(models, icosphere(3)).verdict == "nothing fits"
 
 
 def test_alike_models_leave_it_unsure(models):
@@ -75,7 +73,7 @@ def test_alike_models_leave_it_unsure(models):
 
 def test_a_model_alone_is_sure_as_long_as_it_fits(models):
     assert ranked(models[:1], creature(0.45, 3)).verdict == "sure"
-    assert ranked(models[:1], stretched(0.45)).verdict == "nothing fits"
+    assert ranked(models[:1], icosphere(3)).verdict == "nothing fits"
 
 
 def test_usual_scores_are_near_those_of_unseen_poses(models):
@@ -134,7 +132,14 @@ def test_far_below_the_usual_is_another_class():
     assert least_usual(np.array([])) == -np.inf
     assert least_usual(np.array([2.0])) == pytest.approx(1.5)
     assert least_usual(np.array([1.0, 2.0, 3.0])) == pytest.approx(2.0 - 3.0)
-    assert ranking_of(np.array([1.0, 1.2]), [np.array([1.0]), np.array([2.0])]).verdict == "nothing fits"
+    assert ranking_of(np.array([1.0, 1.2]), [np.array([1.0]), np.array([2.0])], "aa").verdict == "nothing fits"
+
+
+def test_scores_count_as_they_are_between_models_of_the_same_settings():
+    usual = [np.array([1.0]), np.array([2.0])]
+    assert ranking_of(np.array([1.1, 1.9]), usual, "aa").best.index == 1
+    assert ranking_of(np.array([1.1, 1.9]), usual, "ab").best.index == 0
+    assert ranking_of(np.array([1.1, 1.9]), [np.array([])] * 2, "ab").best.index == 1
 
 
 def test_models_are_described_together_where_they_can_be(models):

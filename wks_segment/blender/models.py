@@ -85,6 +85,9 @@ def use(settings: WKSSegmentSettings, index: int) -> None:
     adopt(settings)
     if index == settings.used_model or not 0 <= index < len(settings.models):
         return
+    if not settings.models[index].model:  # damaged, and what is in use is not
+        settings.active_model = settings.used_model
+        return
     aside(settings)
     _take(settings, index)
 

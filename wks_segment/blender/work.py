@@ -159,7 +159,10 @@ class Work:
         self.watch.look()
         settings = self.watch.scene().wks_segment
         # Another number of segments numbers them otherwise, as another model does.
-        renumbered, adds = self.learns or self.first is not None, self.learns and not settings.replace_model
+        renumbered = self.learns or self.first is not None
+        # What follows settings is the same model; what is adjusted was undone, and its row with it.
+        follows = self.first is not None and session_of(bpy.context).holds(settings.id_data)
+        adds = self.learns and not (follows or settings.replace_model)
         if adds:
             models.aside(settings)  # names and colors of now are the other model's, before they follow to this one
         tasks.write(settings, self.labels, self.wanted, self.report, self._soft, renumbered)

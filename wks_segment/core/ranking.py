@@ -1,13 +1,14 @@
 """Which model fits a shape: the paper's retrieval (section 5), between models of any settings.
 
-A shape is of the class under whose mixture its signatures are likeliest. What is compared is
-`PoseSegmentation.comparable_score`: neither the length of a signature counts, nor what enters the mixture. What each
-model gives to its own learned poses when they are left out tells what is too little for any class.
+A shape is of the class under whose mixture its signatures are likeliest: compared is
+`PoseSegmentation.comparable_score`. Models of the same settings are compared by it as it is. Between those of other
+settings, which describe shapes in other numbers, counts how far it is from what models of these settings give to their
+own learned poses when they are left out. The same tells what is too little for any class.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -38,7 +39,8 @@ class Rank:
     index : int
         Of the model among those that were ranked.
     score : float
-        `PoseSegmentation.comparable_score`, mean over the poses.
+        Mean of `PoseSegmentation.comparable_score` over the poses; 0 is what is usual for learned poses of models with
+        these settings.
     probability : float
         Among the models of the ranking.
     fits : bool
@@ -127,20 +129,33 @@ def rank(models: Sequence[PoseSegmentation], poses: Sequence[Sequence[PoseSignat
         np.mean([model.comparable_score(pose) for pose in of_model])
         for model, of_model in zip(models, poses, strict=True)
     ])  # fmt: skip
-    return ranking_of(scores, [model.usual_scores_ for model in models])
+    return ranking_of(scores, [model.usual_scores_ for model in models], [_settings(model) for model in models])
 
 
-def ranking_of(scores: FloatArray, usual: Sequence[FloatArray]) -> Ranking:
-    """Of models' scores for a shape, and those that each usually gives (none: any score fits)."""
-    weights = np.exp((scores - scores.max()) / WIDTH)
+def ranking_of(scores: FloatArray, usual: Sequence[FloatArray], settings: Sequence[Hashable]) -> Ranking:
+    """Of models' scores for a shape, those that each usually gives (none: any score fits), and its settings."""
     fits = [score >= least_usual(of_model) for score, of_model in zip(scores, usual, strict=True)]
+    levels: dict[Hashable, list[float]] = {each: [] for each in settings}
+    for each, of_model in zip(settings, usual, strict=True):
+        levels[each] += [float(np.mean(of_model))] if len(of_model) else []
+    known = [level for of_settings in levels.values() for level in of_settings]
+    # Of settings that nothing is known of, what is usual of others is as good as anything.
+    level = np.array([np.mean(levels[each] or known or [0.0]) for each in settings])
+    above = scores - level
+    weights = np.exp((above - above.max()) / WIDTH)
     ranks = tuple(
-        Rank(int(i), float(scores[i]), float(weights[i] / weights.sum()), bool(fits[i]))
-        for i in np.argsort(-scores, kind="stable")
+        Rank(int(i), float(above[i]), float(weights[i] / weights.sum()), bool(fits[i]))
+        for i in np.argsort(-above, kind="stable")
     )
     if not ranks[0].fits:
         return Ranking(ranks, "nothing fits")
     return Ranking(ranks, "sure" if ranks[0].probability >= SURE else "unsure")
+
+
+def _settings(model: PoseSegmentation) -> Hashable:
+    """What scores depend on beside the class."""
+    described = (*sorted(model.describing().items()), model.pieces, model.preset)
+    return (*described, model.scaling, model.covariance_type, len(model.mixture_.weights))
 
 
 def least_usual(usual: FloatArray) -> float:
