@@ -52,7 +52,3 @@ def batch(tmp_path):
         return Batch(jobs=jobs, **(values | changes))
 
     return make
-
-
-def quiet(stage, share):
-    """Progress that is not shown."""

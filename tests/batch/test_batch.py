@@ -1,6 +1,5 @@
 """A batch: each file costs no more than itself, nothing is lost, nothing is done twice or written over."""
 
-import json
 import os
 import signal
 import sys
@@ -8,13 +7,9 @@ import threading
 import time
 
 import pytest
-from conftest import quiet
+from command_line import lines, quiet
 
 from wks_segment.batch import BatchError, Limits, Program, merged
-
-
-def lines(folder, name="batch.jsonl"):
-    return [json.loads(line) for line in (folder / name).read_text().splitlines()]
 
 
 def results(folder):

@@ -8,8 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import quiet
-from test_command import QUICK, run, start, wait_for_lines, write
+from command_line import QUICK, quiet, run, start, wait_for_lines, write
 
 from wks_segment.batch import BatchError
 
