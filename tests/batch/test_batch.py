@@ -101,6 +101,17 @@ def test_resume_does_only_what_is_not_done(batch, tmp_path):
     assert batch(texts, resume=True, again=True).run(quiet)["now"] == 1
 
 
+def test_a_batch_that_was_killed_between_list_and_files_goes_on(batch, tmp_path):
+    batch({"a": "one", "b": "two"}).run(quiet)
+    out, (line, _) = tmp_path / "out", lines(tmp_path / "out")
+    place = out / ".unfinished" / "batch.jsonl" / line["place"]
+    place.mkdir(parents=True)
+    (out / line["outputs"]["--out"]).rename(place / line["outputs"]["--out"])
+    assert batch({"a": "one", "b": "two"}, resume=True).run(quiet)["now"] == 0
+    assert results(out) == {"a.txt", "b.txt"}
+    assert not (out / ".unfinished").exists()
+
+
 def test_what_changed_is_done_again(batch, tmp_path):
     batch({"a": "one", "b": "two"}).run(quiet)
     assert batch({"a": "other", "b": "two"}, resume=True).run(quiet)["now"] == 1

@@ -10,6 +10,7 @@ import faulthandler
 import json
 import os
 import queue
+import shutil
 import sys
 import threading
 import traceback
@@ -41,7 +42,7 @@ def serve(folder: Path, run: Callable[[list[str]], Answer]) -> int:
         Runs one call of the command line. Whatever it raises is an answer as well.
     """
     calls: queue.SimpleQueue[str] = queue.SimpleQueue()
-    threading.Thread(target=_listen, args=(calls,), daemon=True).start()
+    threading.Thread(target=_listen, args=(calls, folder), daemon=True).start()
     _write(folder / READY, {})
     while line := calls.get():
         call = json.loads(line)
@@ -59,11 +60,12 @@ def serve(folder: Path, run: Callable[[list[str]], Answer]) -> int:
     return 0
 
 
-def _listen(calls: queue.SimpleQueue[str]) -> None:
-    """Hand on calls; end the process with its parent, whatever it is doing."""
+def _listen(calls: queue.SimpleQueue[str], folder: Path) -> None:
+    """Hand on calls; end the process with its parent, whatever it is doing, and leave nothing behind."""
     with open(0, encoding="utf-8", closefd=False) as lines:
         for line in lines:
             calls.put(line)
+    shutil.rmtree(folder, ignore_errors=True)
     os._exit(0)
 
 

@@ -17,7 +17,6 @@ from distributed import Client, KilledWorker, Worker, WorkerPlugin, as_completed
 from .errors import BatchError, EndedError
 from .job import Job, Outcome
 from .limits import Limits
-from .local import Done
 from .process import Child, python_program
 from .work import do
 
@@ -26,7 +25,7 @@ RETRIES = 2
 """Times that a job is done anew after its worker could not even begin it, as where the folder is not mounted."""
 
 
-def outcomes(jobs: Sequence[Job], scheduler: str, limits: Limits, unfinished: Path) -> Generator[Done]:
+def outcomes(jobs: Sequence[Job], scheduler: str, limits: Limits, unfinished: Path) -> Generator[Outcome]:
     """What comes of each job, as soon as it is there. To close the iterator ends all children.
 
     Parameters
@@ -58,14 +57,14 @@ def outcomes(jobs: Sequence[Job], scheduler: str, limits: Limits, unfinished: Pa
             for future in as_completed(list(futures)):
                 job = futures.pop(future)
                 problem = future.exception()
-                yield future.result() if problem is None else (_lost(job, problem), "")
+                yield future.result() if problem is None else _lost(job, problem)
                 future.release()
         finally:
             # What is at work ends with the children.
             client.unregister_worker_plugin(name)
 
 
-def _do(job: Job, seconds: float, unfinished: str, plugin: str) -> Done:
+def _do(job: Job, seconds: float, unfinished: str, plugin: str) -> Outcome:
     """Runs on a worker, in one of its threads."""
     children = get_worker().plugins[plugin]
     assert isinstance(children, _Children)
@@ -101,7 +100,7 @@ class _Children(WorkerPlugin):
         while not self._free.empty():
             self._free.get().kill()
 
-    def do(self, job: Job, seconds: float, unfinished: Path) -> Done:
+    def do(self, job: Job, seconds: float, unfinished: Path) -> Outcome:
         """See `work.do`."""
         child = Child(python_program(), self._memory, self._ended.is_set) if self._free.empty() else self._free.get()
         try:

@@ -57,6 +57,8 @@ class Outcome:
     seconds : float
     outputs : dict
         Option to file, relative to the folder of the batch.
+    place : str
+        Folder in which the results are written first; empty if there are none.
     machine : str
         Where it was done.
     result : dict
@@ -70,6 +72,7 @@ class Outcome:
     reason: str = ""
     seconds: float = 0.0
     outputs: Mapping[str, str] = field(default_factory=dict)
+    place: str = ""
     machine: str = ""
     result: Mapping[str, Any] = field(default_factory=dict)
 
@@ -90,7 +93,7 @@ class Outcome:
             outcome = cls(**values)
         except (ValueError, TypeError):
             return None
-        texts = (outcome.input, outcome.name, outcome.key, *outcome.outputs.values())
+        texts = (outcome.input, outcome.name, outcome.key, outcome.place, *outcome.outputs.values())
         return outcome if all(isinstance(text, str) for text in texts) else None
 
 

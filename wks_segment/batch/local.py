@@ -13,13 +13,10 @@ from .limits import Limits
 from .process import Child, Program
 from .work import do
 
-Done = tuple[Outcome, str]
-"""What came of a job, and where its results are; see `do`."""
-
 
 def outcomes(
     jobs: Sequence[Job], program: Program, processes: int, limits: Limits, unfinished: Path
-) -> Generator[Done]:
+) -> Generator[Outcome]:
     """What comes of each job, as soon as it is there. To close the iterator ends all children.
 
     Raises
@@ -30,7 +27,7 @@ def outcomes(
     waiting: queue.SimpleQueue[Job] = queue.SimpleQueue()
     for job in jobs:
         waiting.put(job)
-    found: queue.SimpleQueue[Done | BaseException] = queue.SimpleQueue()
+    found: queue.SimpleQueue[Outcome | BaseException] = queue.SimpleQueue()
     ended = threading.Event()
     memory = limits.bytes()
 
@@ -64,7 +61,7 @@ def outcomes(
                 thread.join()
 
 
-def _next(found: queue.SimpleQueue[Done | BaseException]) -> Done | BaseException:
+def _next(found: queue.SimpleQueue[Outcome | BaseException]) -> Outcome | BaseException:
     """The next in a queue. Asked again and again, since on Windows Ctrl+C does not end a wait."""
     while True:
         try:

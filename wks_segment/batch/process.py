@@ -143,7 +143,8 @@ class Child:
                 process = subprocess.Popen(
                     command, stdin=subprocess.PIPE, stdout=printed, stderr=printed,
                     env={**os.environ, **ONE_THREAD, **dict(self.program.environment)},
-                    start_new_session=True,  # Ctrl+C is for the parent, which ends its children
+                    # Ctrl+C is for the parent, which ends its children.
+                    start_new_session=True, creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
                 )  # fmt: skip
         except OSError as error:
             shutil.rmtree(self._folder, ignore_errors=True)

@@ -79,6 +79,8 @@ class Batch:
         # One for each list, since parts of a batch run at the same time.
         unfinished = self.folder / UNFINISHED / name
         with Record(self.folder / name) as record:
+            for outcome in record.outcomes.values():  # the batch may have been killed between both
+                self._put_in_place(outcome, unfinished)
             shutil.rmtree(unfinished, ignore_errors=True)
             waiting = [job for job in mine if not self._known(job, record.outcomes.get(job.input))]
             self._check_files(waiting)
@@ -107,12 +109,10 @@ class Batch:
         progress(_said(done, of, 0, None, ""), done / of)
         with _ended_by_signals(), closing(self._outcomes(jobs, unfinished)) as outcomes:
             try:
-                for outcome, place in outcomes:
+                for outcome in outcomes:
                     # The list before the files: what is there without being in it is not ours.
                     record.add(outcome)
-                    for path in outcome.outputs.values():
-                        (self.folder / path).parent.mkdir(parents=True, exist_ok=True)
-                        (unfinished / place / path).replace(self.folder / path)
+                    self._put_in_place(outcome, unfinished)
                     failures += not outcome.done
                     done += 1
                     left = (time.monotonic() - begun) / (done - before) * (of - done)
@@ -122,7 +122,7 @@ class Batch:
                     f"ended by the user with {done} of {of} files done: go on with the same command and --resume"
                 ) from None
 
-    def _outcomes(self, jobs: Sequence[Job], unfinished: Path) -> Generator[local.Done]:
+    def _outcomes(self, jobs: Sequence[Job], unfinished: Path) -> Generator[Outcome]:
         if self.scheduler is None or not jobs:
             return local.outcomes(jobs, self.program, self.processes, self.limits, unfinished)
         from . import cluster
@@ -138,6 +138,14 @@ class Batch:
             )
         if self.scheduler is None and self.limits.memory is not None and not can_watch_memory():
             raise BatchError("--memory-limit needs Linux, or the package psutil")
+
+    def _put_in_place(self, outcome: Outcome, unfinished: Path) -> None:
+        """Move results to where they belong, as far as they are not there yet."""
+        for path in outcome.outputs.values():
+            written = unfinished / outcome.place / path
+            if outcome.place and written.is_file():
+                (self.folder / path).parent.mkdir(parents=True, exist_ok=True)
+                written.replace(self.folder / path)
 
     def _known(self, job: Job, outcome: Outcome | None) -> bool:
         """Whether a job was done before, and its results are there."""

@@ -15,8 +15,8 @@ KEPT = ("segments", "parts", "poses", "certainty", "rankings", "best", "verdict"
 """Of what a command prints, what the list keeps."""
 
 
-def do(job: Job, child: Child, seconds: float, unfinished: Path) -> tuple[Outcome, str]:
-    """Have a child do a job.
+def do(job: Job, child: Child, seconds: float, unfinished: Path) -> Outcome:
+    """Have a child do a job; what came of it.
 
     Parameters
     ----------
@@ -25,11 +25,7 @@ def do(job: Job, child: Child, seconds: float, unfinished: Path) -> tuple[Outcom
     seconds : float
         Limit of its time.
     unfinished : path
-        A folder in which its results are written first.
-
-    Returns
-    -------
-    What came of it, and the name of the folder in `unfinished` that holds its results; empty if there are none.
+        A folder in which its results are written first, in one of their own.
 
     Raises
     ------
@@ -61,16 +57,16 @@ def do(job: Job, child: Child, seconds: float, unfinished: Path) -> tuple[Outcom
             shutil.rmtree(folder, ignore_errors=True)
     # Names in messages are those of the batch, not of where results are written first.
     reason = reason.replace(f"{folder}/", "")
-    outcome = Outcome(
+    return Outcome(
         job.input, job.name, job.key,
         status="failed" if result is None else "done",
         reason=reason,
         seconds=round(time.monotonic() - begun, 3),
         outputs={} if result is None else {**job.outputs, **_beside(folder, job)},
+        place="" if result is None else folder.name,
         machine=platform.node(),
         result={name: result[name] for name in KEPT if name in result} if result else {},
     )  # fmt: skip
-    return outcome, folder.name if outcome.done else ""
 
 
 def _beside(folder: Path, job: Job) -> dict[str, str]:
