@@ -7,7 +7,7 @@ bodies       the same area on other bodies: MakeHuman's with other bones and oth
 choices      consistency and human, of MakeHuman's body and the Princeton humans, with other poses learned
 human        connected parts against people's (Rand-index error), components against part names (adjusted Rand index)
 seeds        adjusted Rand index between the labels of models that were learned with five seeds
-retrieval    share of shapes whose class has the model under which they are likeliest
+retrieval    share of shapes whose class has the model that `rank` puts first: Princeton classes and characters
 remesh       area that keeps its label when a mesh is resampled to half and to twice its faces
 robustness   the same for damaged meshes (as `benchmarks.robustness`)
 
@@ -28,7 +28,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from benchmarks import agreement, characters, makehuman, perturbations, robustness
+from benchmarks import agreement, characters, makehuman, perturbations, retrieval, robustness
 from benchmarks.bodies import other_body
 from benchmarks.speed import table_row
 from wks_segment.core import PoseSegmentation, PoseSignature, TriangleMesh, connect
@@ -184,19 +184,26 @@ def seeds(options: argparse.Namespace) -> None:
             print(_pairs_row(name, preset, labels), flush=True)
 
 
-def retrieval(options: argparse.Namespace) -> None:
-    """The paper's section 5 on the Princeton classes: five models of each learned, fifteen asked for."""
-    described = {name: list(_princeton(options.data / "psb", name)[1].values()) for name in CLASSES}
-    for preset in PRESETS:
-        models = {name: _model(options, preset).fit([shapes[i] for i in LEARNED]) for name, shapes in described.items()}
-        table = np.zeros((len(CLASSES),) * 2, dtype=int)
-        for i, shapes in enumerate(described.values()):
-            for shape in (one for j, one in enumerate(shapes) if j not in LEARNED):
-                table[i, int(np.argmax([model.score(shape) for model in models.values()]))] += 1
-        print(f"\n| {preset}: queries of | {' | '.join(CLASSES)} |\n|{'---|' * (len(CLASSES) + 1)}")
-        for name, row in zip(CLASSES, table, strict=True):
-            print(table_row([name, *map(str, row)]))
-        print(f"\nright: {np.trace(table)} of {table.sum()} ({np.trace(table) / table.sum():.1%})", flush=True)
+def which_class(options: argparse.Namespace) -> None:
+    """The paper's section 5, on the Princeton classes and on the characters; exit code 1 below the floors."""
+    shapes = {name: list(_princeton(options.data / "psb", name)[1].values()) for name in CLASSES}
+    rates: dict[str, float] = {}
+    chosen = _choices([str(i) for i in range(20)], [str(i) for i in LEARNED])
+    for choice in chosen:
+        found = retrieval.retrieved(lambda: _model(options, "default"), shapes, [int(i) for i in choice])
+        retrieval.report(f"learned {' '.join(choice)}", found)
+        if not rates:
+            retrieval.picture(found, options.output / "retrieval_princeton.png")
+        rates["Princeton" if not rates else " ".join(choice)] = found.rate
+    each = list(rates.values())
+    print(f"\nfive choices: mean {np.mean(each):.1%}, spread {np.std(each, ddof=1):.1%}, worst {min(each):.1%}")
+    retrieval.report("paper", retrieval.retrieved(lambda: _model(options, "paper"), shapes, LEARNED))
+    found = retrieval.of_characters(options.data / "characters", options.output)
+    retrieval.report("characters", found)
+    rates["characters"] = found.rate
+    failed = [name for name, floor in retrieval.FLOORS.items() if rates[name] < floor]
+    if failed:
+        sys.exit(f"below the floor: {', '.join(failed)}")
 
 
 def remesh(options: argparse.Namespace) -> None:
@@ -225,7 +232,7 @@ def damage(options: argparse.Namespace) -> None:
 
 STUDIES: dict[str, Callable[[argparse.Namespace], None]] = {
     "consistency": consistency, "bodies": bodies, "choices": choices, "human": human, "seeds": seeds,
-    "retrieval": retrieval, "remesh": remesh, "robustness": damage,
+    "retrieval": which_class, "remesh": remesh, "robustness": damage,
 }  # fmt: skip
 
 

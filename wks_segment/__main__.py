@@ -19,7 +19,7 @@ def main() -> None:
 
     blender.register()
     try:
-        code = blender.command.run(sys.argv[1:])
+        code = blender.commands.run(sys.argv[1:])
     except SystemExit as end:  # argparse
         code = int(end.code or 0)
     except BaseException:

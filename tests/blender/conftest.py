@@ -100,7 +100,7 @@ def command(scene, extension, printed):
         printed()
         with contextlib.redirect_stdout(STDOUT):
             try:
-                code = extension.command.run([str(argument) for argument in arguments])
+                code = extension.commands.run([str(argument) for argument in arguments])
             except SystemExit as end:
                 code = end.code
             STDOUT.flush()

@@ -267,7 +267,7 @@ def test_nothing_follows_when_it_is_off_and_update_does_it(walker, settings, ses
 
 
 def test_nothing_follows_by_itself_where_it_takes_long(walker, settings, session, monkeypatch):
-    session.work.report.seconds["label"] = module.LIVE_SECONDS + 1
+    session.work.report.seconds["label"] = 6.0
     settings.n_segments = 2
     assert not bpy.app.timers.is_registered(session.timer)
     assert OPS.update() == {"FINISHED"}

@@ -20,7 +20,7 @@ from builders import (
     snapshot,
 )
 
-from wks_segment.blender import operators, panel
+from wks_segment.blender import operators, panel, panel_models
 from wks_segment.blender import poses as reader
 from wks_segment.blender.poses import Character
 from wks_segment.core import PoseSegmentation, hierarchy, spectrum
@@ -629,8 +629,9 @@ def test_outputs_can_be_chosen_in_the_panel(settings, materials):
 
 
 def test_panel_breaks_long_lines_and_keeps_pairs_together(settings):
+    settings.model = "{}"
     settings.model_summary = "From Fox\nCertainty by segments: " + " · ".join(f"{i} 0.91" for i in range(2, 17))
-    labels = drawn(panel.WKS_SEGMENT_PT_model).column.return_value.label.call_args_list
+    labels = drawn(panel_models.WKS_SEGMENT_PT_models).column.return_value.label.call_args_list
     lines = [call.kwargs["text"] for call in labels]
     assert lines[0] == "From Fox"
     assert max(map(len, lines)) <= panel.WIDTH

@@ -8,7 +8,15 @@ from wks_segment.blender.translations import GERMAN, GERMAN_OPERATORS, OPERATOR,
 pytestmark = pytest.mark.usefixtures("scene")
 BLENDERS = {"", "Name", "Number", "Color", "Unique name used in the code and scripting", "File Path", "Path to file"}
 """What Blender translates itself, or gives to properties that it makes."""
-MADE_BY_BLENDER = {"check_existing", "filepath", "filter_glob", "hide_props_region", "remove_name", "remove_active"}
+MADE_BY_BLENDER = {
+    "check_existing",
+    "filepath",
+    "filter_glob",
+    "hide_props_region",
+    "remove_name",
+    "remove_active",
+    "bl_idname",
+}
 
 
 def texts_of(properties):
@@ -31,7 +39,7 @@ def shown(classes):
             yield "*", kind.description
             if cls.bl_idname != "wks_segment.add_preset":
                 yield from (("*", text) for text in texts_of(kind.properties))
-        elif issubclass(cls, bpy.types.PropertyGroup):
+        elif issubclass(cls, bpy.types.PropertyGroup | bpy.types.AddonPreferences):
             yield from (("*", text) for text in texts_of(cls.bl_rna.properties))
         else:
             yield "*", getattr(cls, "bl_label", "")

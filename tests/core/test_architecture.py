@@ -26,6 +26,7 @@ CHAIN = [
     "spectrum",
     "signature",
     "mixture",
+    "explained",
     "smoothing",
     "regions",
     "shape",
@@ -37,11 +38,13 @@ CHAIN = [
     "labelling",
     "parts",
     "grouping",
+    "layout",
     "learning",
     "region_atlas",
     "part_notes",
     "model_file",
     "segmentation",
+    "ranking",
 ]
 
 
@@ -60,6 +63,20 @@ def test_core_knows_neither_blender_nor_the_other_rooms(path):
     for level, module in imports(path):
         assert module.split(".")[0] not in BLENDERS_OWN | {"wks_segment"}, f"{path.name} imports {module}"
         assert level <= 1, f"{path.name} reaches out of core for {module}"
+
+
+@pytest.mark.parametrize("path", sorted((PACKAGE / "batch").glob("*.py")), ids=lambda path: path.stem)
+def test_batch_uses_core_only(path):
+    """What it runs is a command line."""
+    for level, module in imports(path):
+        assert module.split(".")[0] not in BLENDERS_OWN | {"wks_segment"}, f"{path.name} imports {module}"
+        assert level <= 1 or (level == 2 and module.split(".")[0] == "core"), f"{path.name} imports {module}"
+
+
+def test_only_the_command_line_uses_batch():
+    for path in (PACKAGE / "blender").rglob("*.py"):
+        if path.parent.name != "commands":
+            assert not any(module.split(".")[0] == "batch" for _, module in imports(path)), path
 
 
 @pytest.mark.parametrize("name", CHAIN)

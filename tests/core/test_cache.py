@@ -29,6 +29,13 @@ class Counting:
     def put(self, key, signature):
         self.cache.put(key, signature)
 
+    def arrays(self, key):
+        return self.cache.arrays(key)
+
+    def keep(self, key, arrays):
+        self.kept = getattr(self, "kept", 0) + 1
+        self.cache.keep(key, arrays)
+
 
 @pytest.fixture(params=["memory", "disk"])
 def cache(request, tmp_path):
@@ -231,3 +238,66 @@ def test_several_processes_use_one_folder(tmp_path):
     files = list(tmp_path.iterdir())
     assert {path.suffix for path in files} == {".npz"}
     assert sum(path.stat().st_size for path in files) <= limit
+
+
+POSES = [creature(bend, 3) for bend in (0.0, 0.3)]
+OTHER = creature(0.2, 2)
+"""Of another meshing."""
+
+
+@pytest.mark.parametrize(
+    ("learned", "settings"),
+    [
+        (POSES, {}),
+        (POSES, {"scaling": "raw"}),
+        (POSES[:1], {}),
+        ([POSES[0], OTHER], {}),
+        ([POSES[0], OTHER], {"covariance_type": "tied"}),
+    ],
+    ids=["one mesh", "one mesh, raw", "one pose", "meshes", "meshes, tied"],
+)
+def test_a_fit_with_a_cache_is_the_very_same_as_one_without(cache, learned, settings):
+    for number in (6, 4):
+        parameters = SMALL | settings | {"n_segments": number}
+        cached = PoseSegmentation(**parameters).fit(learned, cache=cache)
+        assert cached.to_json() == PoseSegmentation(**parameters).fit(learned).to_json()
+
+
+def test_another_number_of_segments_needs_no_mixtures(cache):
+    stages = {}
+    for number in (4, 8, 3, "auto"):
+        said = stages[number] = set()
+        model = PoseSegmentation(**SMALL | {"n_segments": number})
+        model.fit(POSES, lambda stage, share, said=said: said.add((stage, round(share, 2))), cache=cache)
+    assert cache.kept == 1
+    assert all(len(of_number) < len(stages[4]) / 2 for number, of_number in stages.items() if number != 4)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"n_segments": 9}, {"covariance_type": "diag"}, {"scaling": "raw"}, {"n_energies": 21}, {"laplacian": "delaunay"}],
+    ids=str,
+)
+def test_what_enters_the_mixtures_makes_others(cache, change):
+    PoseSegmentation(**SMALL).fit(POSES, cache=cache)
+    PoseSegmentation(**SMALL | change).fit(POSES, cache=cache)
+    assert cache.kept == 2
+
+
+def test_mixtures_with_fewer_components_than_meant_are_not_kept(cache):
+    """How many they have depends on the number of segments then."""
+    cube = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
+    box = TriangleMesh(cube, [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6],
+                              [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]])  # fmt: skip
+    for number in (2, 3):
+        parameters = SMALL | {"n_segments": number}
+        cached = PoseSegmentation(**parameters).fit([box], cache=cache)
+        assert cached.to_json() == PoseSegmentation(**parameters).fit([box]).to_json()
+
+
+def test_mixtures_that_are_damaged_are_made_again(tmp_path):
+    cache = DiskCache(tmp_path)
+    model = PoseSegmentation(**SMALL).fit(POSES, cache=cache)
+    for path in tmp_path.glob("*.npz"):
+        path.write_bytes(path.read_bytes()[:-200])
+    assert PoseSegmentation(**SMALL).fit(POSES, cache=cache).to_json() == model.to_json()

@@ -10,7 +10,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "refusals.md").read_text(encoding="utf-8").splitlines()
 REFUSALS = {
     "UserError", "TooLargeError", "ChangedError", "ValueError", "TypeError", "PermissionError", "MemoryError",
-    "SpectrumError", "ModelFileError", "ArgumentTypeError", "poll_message_set",
+    "SpectrumError", "ModelFileError", "BatchError", "ArgumentTypeError", "poll_message_set",
 }  # fmt: skip
 """What is called with a message for the user."""
 

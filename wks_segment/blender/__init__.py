@@ -6,14 +6,18 @@ from typing import Any
 
 import bpy
 
-from . import command, menu, operators, panel, panel_segments, presets, session
+from . import commands, menu, models, operators, panel, panel_models, panel_segments, preferences, presets, session
 from .jobs import HOLDER, Desk
+from .model_item import WKSModelItem, WKSRankItem
 from .segment_item import WKSSegmentItem
 from .settings import WKSSegmentSettings
 from .translations import TRANSLATIONS
 
 CLASSES = (
+    preferences.WKSSegmentPreferences,
     WKSSegmentItem,
+    WKSModelItem,
+    WKSRankItem,
     WKSSegmentSettings,
     *operators.CLASSES,
     *menu.CLASSES,
@@ -21,6 +25,7 @@ CLASSES = (
     # Sub-panels stand in the order of their registration.
     panel.CLASSES[0],
     *panel_segments.CLASSES,
+    *panel_models.CLASSES,
     *panel.CLASSES[1:],
 )
 COMMAND = "wks_segment"
@@ -37,13 +42,15 @@ def register() -> None:
     setattr(bpy.types.WindowManager, HOLDER, Desk())
     setattr(bpy.types.WindowManager, session.HOLDER, session.Session())
     bpy.app.translations.register(__name__, TRANSLATIONS)
+    bpy.app.handlers.load_post.append(models.on_load)
     bpy.types.VIEW3D_MT_object.append(menu.draw_in_object_menu)
-    _commands.append(bpy.utils.register_cli_command(COMMAND, command.run))
+    _commands.append(bpy.utils.register_cli_command(COMMAND, commands.run))
 
 
 def unregister() -> None:
     """Called by Blender when the extension is disabled."""
     bpy.utils.unregister_cli_command(_commands.pop())
+    bpy.app.handlers.load_post.remove(models.on_load)
     bpy.types.VIEW3D_MT_object.remove(menu.draw_in_object_menu)
     bpy.app.translations.unregister(__name__)
     for holder in (session.HOLDER, HOLDER):

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core.description import Progress
 from ..core.mesh import FloatArray, IntArray
-from . import files, tasks
+from . import files, models, tasks
 from . import poses as reader
 from .characters import Character
 from .creature import FIRST_FRAME, LAST_FRAME, build_creature
@@ -73,6 +73,7 @@ def run(
     described = tasks.learn(model, training, report, lambda stage, done: progress(stage, 0.5 * done))
     together = tasks.label(model, training, described, wanted, report, lambda stage, done: progress(stage, 0.5))
     soft = tasks.soften(model, training, described, together, wanted, report, lambda stage, done: progress(stage, 0.5))
+    models.aside(settings)
     tasks.write(settings, together, wanted, report, soft, renumbered=True)
     counted = report.n_segments, report.parts
 
@@ -100,7 +101,7 @@ def run(
         raise UserError(f"{paths['model']}: {error}") from error
     except OSError as error:
         raise UserError(f"{paths['model']}: the model could not be written: {error.strerror or error}") from error
-    settings.keep_model(model, [f"From {character.name}", *report.facts[:3]])
+    models.keep(settings, model, [f"From {character.name}", *report.facts[:3]], character.name, add=True)
     files.save_scene(paths["scene"])
     return {
         "poses": [

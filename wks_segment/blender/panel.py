@@ -10,9 +10,8 @@ import bpy
 
 from .jobs import desk_of
 from .presets import WKS_SEGMENT_PT_presets
-from .session import LIVE_SECONDS, session_of
+from .session import session_of
 
-NO_MODEL = "No model yet:\nselect a character,\nthen Learn and Segment"
 WIDTH = 36
 """Letters in a line of the sidebar, about: Blender cuts off what is longer."""
 
@@ -60,7 +59,7 @@ class _Sidebar:
             row.operator("wks_segment.accept", icon="CHECKMARK")
             row.operator("wks_segment.discard", icon="X")
             return
-        slow = session.seconds > LIVE_SECONDS
+        slow = session.is_slow
         if settings.live and slow:
             for line in wrapped(f"Labels take {session.seconds:.0f} seconds here, too long to follow by themselves"):
                 column.label(text=line)
@@ -148,20 +147,6 @@ class WKS_SEGMENT_PT_bake(SubPanel, bpy.types.Panel):
         self.layout.operator("wks_segment.bake", icon="RENDER_STILL")
 
 
-class WKS_SEGMENT_PT_model(SubPanel, bpy.types.Panel):
-    """The learned model."""
-
-    bl_label = "Model"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        column = self.layout.column()
-        for line in wrapped(context.scene.wks_segment.model_summary or NO_MODEL):
-            column.label(text=line)
-        row = self.layout.row(align=True)
-        row.operator("wks_segment.load_model", text="Load", icon="IMPORT")
-        row.operator("wks_segment.save_model", text="Save", icon="EXPORT")
-
-
 class WKS_SEGMENT_PT_advanced(SubPanel, bpy.types.Panel):
     """What most users leave as it is."""
 
@@ -194,6 +179,5 @@ CLASSES = (
     WKS_SEGMENT_PT_main,
     WKS_SEGMENT_PT_outputs,
     WKS_SEGMENT_PT_bake,
-    WKS_SEGMENT_PT_model,
     WKS_SEGMENT_PT_advanced,
 )

@@ -62,18 +62,18 @@ def render_poses(tiles: Sequence[Tile], path: Path, columns: int = COLUMNS, styl
     axes = np.array([right, up, towards])
     placed = [tile.pose.mesh.vertices @ axes.T for tile in tiles]
     side = MARGIN * max(float(np.ptp(points[:, :2], axis=0).max()) for points in placed)
-    with _scene() as scene:
+    with picture_scene() as scene:
         for i, (tile, points) in enumerate(zip(tiles, placed, strict=True)):
             middle = (points.min(axis=0) + points.max(axis=0)) / 2
             place = np.array([i % columns, -(i // columns), 0.0]) * side
             _add_pose(scene, (points - middle + place) / side, tile, style)
             _add_caption(scene, tile.caption, place / side)
         _add_camera(scene, columns, rows)
-        _render(scene, path, columns, rows)
+        render(scene, path, TILE * columns, TILE * rows)
 
 
 @contextmanager
-def _scene() -> Iterator[bpy.types.Scene]:
+def picture_scene() -> Iterator[bpy.types.Scene]:
     """An empty scene that takes all that was added to it along when it goes."""
     scene = bpy.data.scenes.new("WKS Segment picture")
     scene.world = bpy.data.worlds.new("WKS Segment picture")
@@ -94,7 +94,7 @@ def _add_pose(scene: bpy.types.Scene, points: FloatArray, tile: Tile, style: Sty
     mesh = bpy.data.meshes.new("pose")
     mesh.from_pydata(points.tolist(), [], tile.pose.mesh.faces.tolist())
     mesh.shade_smooth()
-    _paint(mesh, np.repeat(_triangle_colors(tile, style), 3, axis=0))
+    paint(mesh, np.repeat(_triangle_colors(tile, style), 3, axis=0))
     scene.collection.objects.link(bpy.data.objects.new("pose", mesh))
 
 
@@ -105,22 +105,30 @@ def _triangle_colors(tile: Tile, style: Style) -> FloatArray:
 
 
 def _add_caption(scene: bpy.types.Scene, text: str, place: FloatArray) -> None:
+    letters = add_text(scene, text, CAPTION_SIZE)
+    letters.location = (place[0], place[1] - 0.5 + CAPTION_SIZE / 2, 0.0)
+
+
+def add_text(
+    scene: bpy.types.Scene, text: str, size: float, align: str = "CENTER", color: tuple[float, ...] = CAPTION_COLOR
+) -> bpy.types.Object:
+    """Letters as a mesh, on a line through the origin."""
     curve = bpy.data.curves.new("caption", "FONT")
     curve.body = text
-    curve.size = CAPTION_SIZE
-    curve.align_x = "CENTER"
+    curve.size = size
+    curve.align_x = align
     letters = bpy.data.objects.new("caption", curve)
     # Letters take a color only as a mesh.
     mesh = bpy.data.meshes.new_from_object(letters)
     bpy.data.objects.remove(letters)
     bpy.data.curves.remove(curve)
-    _paint(mesh, np.tile(CAPTION_COLOR, (len(mesh.loops), 1)))
+    paint(mesh, np.tile(color, (len(mesh.loops), 1)))
     caption = bpy.data.objects.new("caption", mesh)
-    caption.location = (place[0], place[1] - 0.5 + CAPTION_SIZE / 2, 0.0)
     scene.collection.objects.link(caption)
+    return caption
 
 
-def _paint(mesh: bpy.types.Mesh, srgb: FloatArray) -> None:
+def paint(mesh: bpy.types.Mesh, srgb: FloatArray) -> None:
     """Give each corner of a mesh one of the (corners, 3) colors."""
     colors = np.ones((len(mesh.loops), 4), dtype=np.float32)
     colors[:, :3] = srgb
@@ -139,9 +147,10 @@ def _add_camera(scene: bpy.types.Scene, columns: int, rows: int) -> None:
     scene.camera = camera
 
 
-def _render(scene: bpy.types.Scene, path: Path, columns: int, rows: int) -> None:
+def render(scene: bpy.types.Scene, path: Path, width: int, height: int, light: str = "STUDIO") -> None:
+    """Render a scene to a PNG file, in the colours of its meshes; UserError if that fails or it cannot be written."""
     scene.render.engine = "BLENDER_WORKBENCH"
-    scene.render.resolution_x, scene.render.resolution_y = TILE * columns, TILE * rows
+    scene.render.resolution_x, scene.render.resolution_y = width, height
     scene.render.resolution_percentage = 100
     scene.render.image_settings.file_format = "PNG"
     # A plain name, since Blender takes braces for templates and adds a suffix that it misses.
@@ -149,8 +158,8 @@ def _render(scene: bpy.types.Scene, path: Path, columns: int, rows: int) -> None
     scene.render.filepath = str(temporary)
     scene.view_settings.view_transform = "Standard"
     shading = scene.display.shading
-    shading.light, shading.color_type = "STUDIO", "VERTEX"
-    shading.show_cavity = True
+    shading.light, shading.color_type = light, "VERTEX"
+    shading.show_cavity = light == "STUDIO"
     try:
         bpy.ops.render.render(write_still=True, scene=scene.name)
     except RuntimeError as error:

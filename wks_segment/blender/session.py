@@ -15,6 +15,7 @@ from ..core import MemoryCache
 from .edits import merged
 from .errors import ChangedError, UserError
 from .jobs import desk_of, redraw
+from .preferences import preference
 from .preview import Preview
 
 if TYPE_CHECKING:
@@ -25,8 +26,6 @@ HOLDER = "wks_segment_session"
 """Name of the session at the type of Blender's window manager."""
 REST = 0.1
 """Seconds for which settings must have rested."""
-LIVE_SECONDS = 5.0
-"""Labels that took longer the last time do not follow by themselves."""
 LIVE = ("n_segments", "auto_segments", "sides", "smoothness", "min_share", "snap_to")
 """Settings that labels follow."""
 NOTHING = "Nothing was learned or applied since this file was opened, or it was undone"
@@ -41,7 +40,7 @@ class Session:
     """
 
     def __init__(self) -> None:
-        self.cache = MemoryCache()
+        self._cache = MemoryCache()
         self.work: Work | None = None
         self.said = ""
         """Why labels do not follow any more."""
@@ -56,6 +55,12 @@ class Session:
         self._handlers = ((bpy.app.handlers.load_pre, self._on_load), (bpy.app.handlers.undo_post, self._on_undo))
         for handlers, function in self._handlers:
             handlers.append(function)
+
+    @property
+    def cache(self) -> MemoryCache:
+        """The signatures, as many as the preferences allow."""
+        self._cache.limit = 1_000_000 * preference(bpy.context, "cache_megabytes")
+        return self._cache
 
     def keep(self, work: Work, scene: bpy.types.Scene) -> None:
         """Keep a work that was written to a scene."""
@@ -81,9 +86,14 @@ class Session:
         """What finding labels took the last time."""
         return 0.0 if self.work is None else self.work.report.seconds.get("label", 0.0)
 
+    @property
+    def is_slow(self) -> bool:
+        """Whether that is too long for labels to follow by themselves."""
+        return bool(self.seconds > preference(bpy.context, "live_seconds"))
+
     def mark(self, scene: bpy.types.Scene) -> None:
         """Let labels follow as soon as the settings rest, if they are to."""
-        if not (scene.wks_segment.live and self.holds(scene)) or self.seconds > LIVE_SECONDS:
+        if not (scene.wks_segment.live and self.holds(scene)) or self.is_slow:
             return
         self._due = time.monotonic() + REST
         if not bpy.app.timers.is_registered(self.timer):

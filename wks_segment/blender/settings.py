@@ -17,8 +17,9 @@ from bpy.props import (
 )  # fmt: skip
 
 from ..core import PartNotes, PoseSegmentation
-from .certainty import certainty_lines
 from .errors import UserError
+from .model_item import WKSModelItem, WKSRankItem
+from .models import followed
 from .palette import DEFAULT, MAX_COLOURS, RECIPES
 from .segment_item import WKSSegmentItem
 from .session import session_of
@@ -280,7 +281,24 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         default=False,
     )
 
-    model: StringProperty(options={"HIDDEN"}, description="The learned model, as JSON")
+    models: CollectionProperty(type=WKSModelItem, name="Models", description="The models of this scene")
+    active_model: IntProperty(
+        name="Active Model", description="The model in use: labels, names and colors are its own", min=0, max=9999,
+        update=followed,
+    )  # fmt: skip
+    used_model: IntProperty(
+        options={"HIDDEN"}, description="Row of the model whose text is below", default=-1, min=-1, max=9999
+    )
+    replace_model: BoolProperty(
+        name="Replace",
+        description="Learn and Segment puts what it learns in the place of the active model. Otherwise it adds one",
+        default=False,
+    )
+    ranking: CollectionProperty(type=WKSRankItem, name="Ranking", description="Models that may fit, best first")
+    ranked: StringProperty(options={"HIDDEN"}, description="Names of the objects that were ranked, as JSON")
+    verdict: StringProperty(options={"HIDDEN"}, description="How sure the first of the ranking is")
+
+    model: StringProperty(options={"HIDDEN"}, description="The model in use, as JSON")
     model_summary: StringProperty(options={"HIDDEN"}, description="Lines on what the model was learned from")
 
     applied: StringProperty(options={"HIDDEN"}, description="What the labels in this scene are from, see `Session`")
@@ -329,8 +347,3 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
     def style(self) -> Style:
         """Names and colours of parts as the user has them."""
         return Style.of(self.notes(), self.palette)
-
-    def keep_model(self, model: PoseSegmentation, summary: list[str]) -> None:
-        """Store a fitted model in the scene, with a few lines on where it is from and its number of segments."""
-        self.applied = ""
-        self.model, self.model_summary = model.to_json(), "\n".join([*summary, *certainty_lines(model)])

@@ -13,12 +13,21 @@ import bpy
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..core import Connection, PoseSegmentation, SignatureCache, SpectrumError, SpectrumWarning, Workpiece, connect
+from ..core import (
+    Cache,
+    Connection,
+    PoseSegmentation,
+    SignatureCache,
+    SpectrumError,
+    SpectrumWarning,
+    Workpiece,
+    connect,
+)
 from ..core.description import Progress
 from ..core.memory import available_memory
 from ..core.mesh import FloatArray, IntArray
 from ..core.segmentation import DESCRIBED
-from . import parts, segments
+from . import models, parts, segments
 from . import poses as reader
 from .bodies import Body
 from .characters import Character
@@ -97,7 +106,7 @@ def check_limits(model: PoseSegmentation, poses: Sequence[Pose], settings: WKSSe
 
 def learn(
     model: PoseSegmentation, poses: Sequence[Pose], report: Report, progress: Progress,
-    cache: SignatureCache | None = None,
+    cache: Cache | None = None, workers: int | None = None,
 ) -> list[Workpiece]:  # fmt: skip
     """Fit a model to poses; what is known of each pose.
 
@@ -112,10 +121,10 @@ def learn(
             f'"{poses[0].character.name}" has {most} faces, too few for {model.n_segments} segments: '
             "take fewer segments, or subdivide it"
         )
-    described = describe(model, poses, report, progress, DESCRIBED, cache)
+    described = describe(model, poses, report, progress, DESCRIBED, cache, workers)
     with report.stage("mixture"):
         try:
-            model.fit(described, lambda stage, share: progress("Learning the segments", share), poses[0].upright)
+            model.fit(described, lambda stage, share: progress("Learning the segments", share), poses[0].upright, cache)
         except ValueError as error:
             raise UserError(f"The segments could not be learned: {error}") from error
     report.tell_of(model)
@@ -124,7 +133,7 @@ def learn(
 
 def describe(
     model: PoseSegmentation, poses: Sequence[Pose], report: Report, progress: Progress, share: float = 1.0,
-    cache: SignatureCache | None = None,
+    cache: SignatureCache | None = None, workers: int | None = None,
 ) -> list[Workpiece]:  # fmt: skip
     """Signature of each pose, to be labelled; poses that are one and the same surface are computed once.
 
@@ -154,6 +163,7 @@ def describe(
                     [connections[i] for i in new],
                     lambda stage, done: progress(f"Signature of {stage}", share * done),
                     [f'"{poses[i].name}"' for i in new],
+                    workers=workers,
                     cache=cache,
                 )
         except (ValueError, SpectrumError, MemoryError) as error:
@@ -291,10 +301,7 @@ def stored_model(settings: WKSSegmentSettings) -> PoseSegmentation:
     """The model that was learned in or loaded into this scene; UserError if there is none."""
     if not settings.model:
         raise UserError("No model yet: learn one with Learn and Segment, or load one from a file")
-    try:
-        return PoseSegmentation.from_json(settings.model)
-    except ValueError as error:
-        raise UserError(f"The model in this file cannot be used: {error}") from error
+    return models.from_text(settings.model)
 
 
 def filled(labels: IntArray, body: Body) -> IntArray:

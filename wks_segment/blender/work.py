@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import bpy
 
-from ..core import PoseSegmentation, SignatureCache, Workpiece
+from ..core import Cache, PoseSegmentation, Workpiece
 from ..core.description import Progress
 from ..core.mesh import FloatArray, IntArray
+from . import models, tasks
 from . import poses as reader
-from . import tasks
 from .characters import Character, group, mesh_objects
 from .errors import UserError
 from .poses import Pose
@@ -46,7 +47,7 @@ class Work:
         Whether the model is learned from the poses, and kept in the scene.
     number : int or "auto"
         Segments that the settings asked for when the model was there.
-    cache : SignatureCache
+    cache : Cache
         Asked for signatures, and told of new ones.
     described
         What is known of each pose, once it was computed.
@@ -63,7 +64,7 @@ class Work:
     report: Report
     learns: bool
     number: int | Literal["auto"]
-    cache: SignatureCache
+    cache: Cache
     described: list[Workpiece] = field(default_factory=list)
     first: Work | None = None
     labels: dict[Character, IntArray] = field(default_factory=dict)
@@ -77,13 +78,22 @@ class Work:
         return cls._read(context, context.scene.wks_segment.new_model(), poses, report, learns=True)
 
     @classmethod
-    def applying(cls, context: bpy.types.Context) -> Work:
-        """Read the selected objects to apply the scene's model to them; UserError if they cannot be used."""
+    def applying(
+        cls, context: bpy.types.Context, model: PoseSegmentation | None = None,
+        objects: Sequence[bpy.types.Object] = (),
+    ) -> Work:  # fmt: skip
+        """Read objects to apply a model to them: the selected ones and the model in use if none are given.
+
+        Raises
+        ------
+        UserError
+            If they cannot be used.
+        """
         settings, report = context.scene.wks_segment, Report([])
-        model = tasks.stored_model(settings)
+        model = tasks.stored_model(settings) if model is None else model
         model.smoothness = settings.smoothness
         with report.stage("read"):
-            report.poses = reader.read_objects(context, group(mesh_objects(context.selected_objects)))
+            report.poses = reader.read_objects(context, group(mesh_objects(objects or context.selected_objects)))
         return cls._read(context, model, report.poses, report, learns=False)
 
     @classmethod
@@ -150,12 +160,17 @@ class Work:
         settings = self.watch.scene().wks_segment
         # Another number of segments numbers them otherwise, as another model does.
         renumbered = self.learns or self.first is not None
+        # What follows settings is the same model; what is adjusted was undone, and its row with it.
+        follows = self.first is not None and session_of(bpy.context).holds(settings.id_data)
+        adds = self.learns and not (follows or settings.replace_model)
+        if adds:
+            models.aside(settings)  # names and colors of now are the other model's, before they follow to this one
         tasks.write(settings, self.labels, self.wanted, self.report, self._soft, renumbered)
         if self.learns:
             names = list(dict.fromkeys(pose.character.name for pose in self.poses))
             origin = f"From {', '.join(names[:3])}{' …' * (len(names) > 3)}"
-            settings.keep_model(self.model, [origin, *self.report.facts[:3]])
+            models.keep(settings, self.model, [origin, *self.report.facts[:3]], ", ".join(names[:3]), adds)
         elif self.first is not None:
             # Or what is applied next would not have the segments that are seen.
             origin = settings.model_summary.partition("\n")[0]
-            settings.keep_model(self.model, [origin, f"{self.model.n_segments_} segments"])
+            models.keep(settings, self.model, [origin, f"{self.model.n_segments_} segments"])

@@ -1,4 +1,4 @@
-"""Signatures that were computed before, by the content of what they were computed from.
+"""Signatures, and what else takes time, that were computed before, by the content of what they were computed from.
 
 A cache is given to `describe_all`; there is none unasked. In memory for one process, on disk for several.
 """
@@ -16,9 +16,10 @@ from collections import OrderedDict
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .mesh import TriangleMesh
 from .pose_signature import PoseSignature
@@ -44,6 +45,18 @@ class SignatureCache(Protocol):
 
     def put(self, key: str, signature: PoseSignature) -> None:
         """Keep a signature under a key."""
+        ...
+
+
+class Cache(SignatureCache, Protocol):
+    """Where arrays of any kind are kept, signatures among them."""
+
+    def arrays(self, key: str) -> Mapping[str, NDArray[Any]] | None:
+        """What `keep` was given under a key; None if nothing, or nothing any more."""
+        ...
+
+    def keep(self, key: str, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Keep arrays under a key; they must not be changed any more."""
         ...
 
 
@@ -73,7 +86,7 @@ class MemoryCache:
 
     def __init__(self, limit: int = MEMORY) -> None:
         self.limit = limit
-        self._kept: OrderedDict[str, tuple[PoseSignature, int]] = OrderedDict()
+        self._kept: OrderedDict[str, tuple[Any, int]] = OrderedDict()
         self._lock = threading.Lock()
 
     @property
@@ -84,19 +97,36 @@ class MemoryCache:
 
     def get(self, key: str) -> PoseSignature | None:
         """See `SignatureCache`."""
+        found = self._found(key)
+        return found if isinstance(found, PoseSignature) else None
+
+    def put(self, key: str, signature: PoseSignature) -> None:
+        """See `SignatureCache`."""
+        signature.signature.setflags(write=False)  # all who ask get the same one
+        self._keep(key, signature, signature.arrays())
+
+    def arrays(self, key: str) -> Mapping[str, NDArray[Any]] | None:
+        """See `Cache`."""
+        found = self._found(key)
+        return found if isinstance(found, dict) else None
+
+    def keep(self, key: str, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """See `Cache`."""
+        for array in arrays.values():
+            array.setflags(write=False)
+        self._keep(key, dict(arrays), arrays)
+
+    def _found(self, key: str) -> object:
         with self._lock:
             if key not in self._kept:
                 return None
             self._kept.move_to_end(key)
             return self._kept[key][0]
 
-    def put(self, key: str, signature: PoseSignature) -> None:
-        """See `SignatureCache`."""
-        arrays = signature.arrays().values()
-        signature.signature.setflags(write=False)  # all who ask get the same one
+    def _keep(self, key: str, what: object, arrays: Mapping[str, NDArray[Any]]) -> None:
         with self._lock:
             self._kept.pop(key, None)
-            self._kept[key] = signature, sum(array.nbytes for array in arrays)
+            self._kept[key] = what, sum(array.nbytes for array in arrays.values())
             held = sum(size for _, size in self._kept.values())
             while held > self.limit:
                 held -= self._kept.popitem(last=False)[1][1]
@@ -128,21 +158,33 @@ class DiskCache:
 
     def get(self, key: str) -> PoseSignature | None:
         """See `SignatureCache`."""
+        try:
+            arrays = self.arrays(key)
+            return None if arrays is None else PoseSignature.of_arrays(arrays)
+        except (ValueError, KeyError):
+            return None
+
+    def put(self, key: str, signature: PoseSignature) -> None:
+        """See `SignatureCache`; OSError if the file cannot be written."""
+        self.keep(key, signature.arrays())
+
+    def arrays(self, key: str) -> Mapping[str, NDArray[Any]] | None:
+        """See `Cache`."""
         path = self._path(key)
         try:
             with np.load(path, allow_pickle=False) as arrays:
-                found = PoseSignature.of_arrays(arrays)
+                found = dict(arrays)
             os.utime(path)
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
             return None
         return found
 
-    def put(self, key: str, signature: PoseSignature) -> None:
-        """See `SignatureCache`; OSError if the file cannot be written."""
+    def keep(self, key: str, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """See `Cache`; OSError if the file cannot be written."""
         with tempfile.NamedTemporaryFile(dir=self.folder, suffix=UNFINISHED, delete=False) as file:
             unfinished = Path(file.name)
             try:
-                np.savez(file, **signature.arrays())
+                np.savez(file, **arrays)
             except BaseException:
                 file.close()
                 unfinished.unlink()

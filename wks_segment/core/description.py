@@ -81,7 +81,7 @@ class PoseDescriber:
         """
         self._check_parameters()
         connection = connection or connect(mesh, pieces=self.pieces)
-        key = "" if cache is None else signature_key(mesh, connection, self._describing())
+        key = "" if cache is None else signature_key(mesh, connection, self.describing())
         known = None if cache is None else cache.get(key)
         if known is not None:
             return known
@@ -97,7 +97,7 @@ class PoseDescriber:
                 warnings.warn(f"a signature was not kept for the next time: {error}", stacklevel=2)
         return described
 
-    def _describing(self) -> dict[str, str | int]:
+    def describing(self) -> dict[str, str | int]:
         """What a signature depends on, beside the mesh and what is one surface of it."""
         return {
             "n_eigenpairs": self.n_eigenpairs,

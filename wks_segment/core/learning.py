@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from .cache import Cache
 from .grouping import Contacts, Ground, Grouping
+from .layout import Layout, layout_key
 from .mesh import FloatArray, IntArray
-from .mixture import CovarianceType, GaussianMixture, TooFewSamplesError, drawn_evenly, fit_mixtures
+from .mixture import CovarianceType, GaussianMixture, TooFewSamplesError, fit_mixtures
 from .pose_signature import PoseSignature
 from .regions import connected_regions
-from .smoothing import HeatFlow
 
 AUTO: tuple[CovarianceType, ...] = ("shared", "diag")
 """Covariances that `covariance_type="auto"` tries on several poses; of one alone it takes the first."""
@@ -21,16 +24,10 @@ CANDIDATES = 4
 """Mixtures of each covariance whose groups are compared."""
 EARNED = 0.8
 """Another covariance than the first is taken if its labels disagree less than this share as much between the poses."""
-COMPARED = 4_000
-"""Faces on which the labels of the learned poses are compared."""
 REGROUPED = 5
 """Rounds of joining at most, until no segment is lost as crumbs."""
-LAID = 0.8
-"""Share of the time of a pose when it is laid out, see `Ground`; the rest is to lay the mixtures on it."""
 COMPONENTS, PER_SEGMENT, MOST_MORE = 24, 3, 64
 """Components of the mixture: at least so many, and so many for each segment, but at most so many more than segments."""
-SMOOTHING_LENGTH = 0.03
-"""Width of the smoothing along borders at smoothness 1, in units of the square root of the area."""
 MIN_SHARE = 0.005
 """Smallest part, as a share of the area."""
 
@@ -41,70 +38,42 @@ class Candidates:
 
     Attributes
     ----------
-    poses
-    mixtures
-        In the space of `standardised`.
-    standardised
-        From the signature of a pose to what enters the mixture.
+    layout : Layout
     number
         Of segments, given a grouping.
     """
 
-    poses: Sequence[PoseSignature]
-    mixtures: Sequence[GaussianMixture]
-    standardised: Callable[[FloatArray], FloatArray]
+    layout: Layout
     number: Callable[[Grouping], int]
 
     @threadpool_limits.wrap(limits=1, user_api="blas")  # on arrays this small, threads wait for each other
-    def best(self, tick: Callable[[float], None]) -> tuple[GaussianMixture, Grouping]:
+    def best(self) -> tuple[GaussianMixture, Grouping]:
         """A mixture, and its grouping.
 
         On poses of one mesh the mixture whose labels agree best between the poses; on several meshes the one whose
         regions are most like the parts that people would cut each into; on one alone the one that is surest.
         """
-        contacts: list[list[Contacts]] = [[] for _ in self.mixtures]
-        likeliest: list[list[IntArray]] = [[] for _ in self.mixtures]
-        grounds = []
-        samples: list[list[FloatArray]] = [[] for _ in self.mixtures]
-        first = self.poses[0].surface.original
-        drawn = drawn_evenly(first.face_areas / first.area, COMPARED) if of_one_mesh(self.poses) else None
-        for i, pose in enumerate(self.poses):
-
-            def of_pose(share: float, begun: int = i) -> None:
-                tick((begun + share) / len(self.poses))
-
-            of_pose(0.0)
-            ground = Ground.of(pose.surface, lambda share, of_pose=of_pose: of_pose(LAID * share))  # type: ignore[misc]
-            standardised = self.standardised(pose.signature)
-            grounds.append(ground)
-            flow = HeatFlow(pose.surface.mesh, SMOOTHING_LENGTH)
-            for j, mixture in enumerate(self.mixtures):
-                of_pose(LAID + (1 - LAID) * j / len(self.mixtures))
-                of_faces = pose.surface.to_faces(flow.smooth(mixture.posteriors(standardised)))
-                contacts[j].append(Contacts.on(ground, of_faces))
-                likeliest[j].append(of_faces.argmax(axis=1))
-                if drawn is not None:
-                    samples[j].append(of_faces[drawn])
-        means = [Contacts.mean(found) for found in contacts]
-        if drawn is not None:
-            means = [mean.with_changes(np.stack(kept)) for mean, kept in zip(means, samples, strict=True)]
-        groupings = [Grouping.of(mean) for mean in means]
-        if len(self.poses) == 1:
+        layout = self.layout
+        groupings = [Grouping.of(mean) for mean in layout.contacts]
+        if len(layout.grounds) == 1:
             losses = [-float(grouping.certainties[self.number(grouping) - 1]) for grouping in groupings]
-        elif drawn is None:
+        elif layout.samples is None:
             losses = [
-                self._unlike_parts(grouping, grounds, of_faces)
-                for grouping, of_faces in zip(groupings, likeliest, strict=True)
+                self._unlike_parts(grouping, layout.grounds, of_faces)
+                for grouping, of_faces in zip(groupings, layout.likeliest, strict=True)
             ]
         else:
             # What has more to fit must earn it.
-            first_type = self.mixtures[0].covariance_type
+            first_type = layout.mixtures[0].covariance_type
             losses = [
                 self._disagreement(grouping, kept) / (1 if mixture.covariance_type == first_type else EARNED)
-                for grouping, kept, mixture in zip(groupings, samples, self.mixtures, strict=True)
+                for grouping, kept, mixture in zip(groupings, layout.samples, layout.mixtures, strict=True)
             ]
         best = int(np.argmin(losses))
-        return self.mixtures[best], self._without_scattered(means[best], groupings[best], grounds, likeliest[best])
+        grouping = self._without_scattered(
+            layout.contacts[best], groupings[best], layout.grounds, layout.likeliest[best]
+        )
+        return layout.mixtures[best], grouping
 
     def _unlike_parts(self, grouping: Grouping, grounds: Sequence[Ground], components: Sequence[IntArray]) -> float:
         """How unlike the parts of the poses the regions are, given the likeliest component of each face in each."""
@@ -112,7 +81,7 @@ class Candidates:
         poses = zip(grounds, components, strict=True)
         return float(np.mean([ground.unlike_parts(group[of_faces]) for ground, of_faces in poses]))
 
-    def _disagreement(self, grouping: Grouping, posteriors: list[FloatArray]) -> float:
+    def _disagreement(self, grouping: Grouping, posteriors: Sequence[FloatArray]) -> float:
         """Share of faces and pairs of poses with different labels, given posteriors of some faces in each pose."""
         number = self.number(grouping)
         labels = np.stack([(each @ np.eye(number)[grouping.groups(number)]).argmax(axis=1) for each in posteriors])
@@ -142,18 +111,13 @@ class Candidates:
         return grouping
 
 
-def fine_mixtures(
-    samples: FloatArray,
-    shares: FloatArray,
-    wanted: int,
-    covariance_types: Sequence[CovarianceType],
-    open_number: bool,
-    tick: Callable[[float], None],
-) -> list[GaussianMixture]:
-    """Mixtures of more components than the segments that are wanted, to be joined.
+@dataclass(frozen=True)
+class Plan:
+    """Which mixtures are fitted to poses: those of more components than the segments that are wanted, to be joined.
 
-    Parameters
+    Attributes
     ----------
+    poses
     samples, shares
         See `fit_mixtures`.
     wanted : int
@@ -164,24 +128,74 @@ def fine_mixtures(
         Whether the number of segments is left open: "tied" and "full" then have a few components, else as many as
         segments. A finer mixture of these would take minutes, and learn every pose by heart.
     """
-    found = []
-    for i, each in enumerate(covariance_types):
 
-        def part(share: float, begun: int = i) -> None:
-            tick((begun + share) / len(covariance_types))
+    poses: Sequence[PoseSignature]
+    samples: FloatArray
+    shares: FloatArray
+    wanted: int
+    covariance_types: Sequence[CovarianceType]
+    open_number: bool
 
-        n_components = min(max(COMPONENTS, PER_SEGMENT * wanted), wanted + MOST_MORE, len(samples))
-        if each in ("tied", "full"):
-            n_components = max(wanted, COMPONENTS // PER_SEGMENT) if open_number else wanted
-        try:
-            found += fit_mixtures(samples, shares, n_components, each, None, CANDIDATES, part)
-        except TooFewSamplesError as error:
-            # A cube has three different vertices at most: no more components than that.
-            found += fit_mixtures(samples, shares, max(wanted, error.distinct), each, None, CANDIDATES, part)
-    return found
+    def laid_out(
+        self,
+        standardised: Callable[[FloatArray], FloatArray],
+        settings: Sequence[Any],
+        cache: Cache | None,
+        mixing: Callable[[float], None],
+        grouping: Callable[[float], None],
+    ) -> Layout:
+        """The mixtures, on the poses; from the cache, if they are there for any number that has as many components.
 
+        Parameters
+        ----------
+        standardised
+            See `Layout.of`.
+        settings
+            What it depends on.
+        cache
+            Asked first, and told in the end.
+        mixing, grouping
+            Called with the share of each of both steps that is done.
+        """
+        key = ""
+        if cache is not None:
+            counts = [self._n_components(each) for each in self.covariance_types]
+            key = layout_key(self.poses, [*settings, *zip(self.covariance_types, counts, strict=True)])
+            kept = cache.arrays(key)
+            try:
+                return Layout.of_arrays(self.poses, kept or {})
+            except (KeyError, ValueError):  # there is none, or it is none
+                mixing(0.0)
+        mixtures = self._mixtures(mixing)
+        with threadpool_limits(1, "blas"):  # on arrays this small, threads wait for each other
+            layout = Layout.of(self.poses, mixtures, standardised, grouping)
+        # With fewer components than meant, these depend on the number of segments.
+        if cache is not None and all(
+            len(mixture.weights) == self._n_components(mixture.covariance_type) for mixture in mixtures
+        ):
+            try:
+                cache.keep(key, layout.arrays())
+            except OSError as error:
+                warnings.warn(f"mixtures were not kept for the next time: {error}", stacklevel=2)
+        return layout
 
-def of_one_mesh(poses: Sequence[PoseSignature]) -> bool:
-    """Whether several poses have the same faces."""
-    faces = [pose.surface.original.faces for pose in poses]
-    return len(poses) > 1 and all(np.array_equal(faces[0], other) for other in faces[1:])
+    def _n_components(self, covariance_type: CovarianceType) -> int:
+        if covariance_type in ("tied", "full"):
+            return max(self.wanted, COMPONENTS // PER_SEGMENT) if self.open_number else self.wanted
+        return min(max(COMPONENTS, PER_SEGMENT * self.wanted), self.wanted + MOST_MORE, len(self.samples))
+
+    def _mixtures(self, tick: Callable[[float], None]) -> list[GaussianMixture]:
+        found = []
+        for i, each in enumerate(self.covariance_types):
+
+            def part(share: float, begun: int = i) -> None:
+                tick((begun + share) / len(self.covariance_types))
+
+            count = self._n_components(each)
+            try:
+                found += fit_mixtures(self.samples, self.shares, count, each, None, CANDIDATES, part)
+            except TooFewSamplesError as error:
+                # A cube has three different vertices at most: no more components than that.
+                count = max(self.wanted, error.distinct)
+                found += fit_mixtures(self.samples, self.shares, count, each, None, CANDIDATES, part)
+        return found

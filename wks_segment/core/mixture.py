@@ -147,8 +147,7 @@ def fit_mixtures(
     if len(samples) > SKETCH:
         sketch = samples[drawn_evenly(shares, SKETCH)]
         sketch_shares = np.full(SKETCH, 1 / SKETCH)
-    mean = shares @ samples
-    floor = VARIANCE_FLOOR * float(shares @ ((samples - mean) ** 2).mean(axis=1))
+    floor = variance_floor(samples, shares)
 
     def tick(share: float) -> None:
         if progress:
@@ -186,6 +185,11 @@ def fit_mixtures(
     return refined
 
 
+def variance_floor(samples: FloatArray, shares: FloatArray) -> float:
+    """What is added to every variance."""
+    return VARIANCE_FLOOR * float(shares @ ((samples - shares @ samples) ** 2).mean(axis=1))
+
+
 def drawn_evenly(shares: FloatArray, count: int) -> IntArray:
     """(count,) samples that stand for all of them: at equal steps along their (n,) shares, which sum to 1.
 
@@ -215,7 +219,7 @@ def _maximise_likelihood(
     shares = shares.astype(samples.dtype)
     for i in range(MAX_ITERATIONS):
         tick(i / MAX_ITERATIONS)
-        mixture = _maximise(samples, squares, responsibilities * shares[:, None], covariance_type, floor)
+        mixture = maximise(samples, squares, responsibilities * shares[:, None], covariance_type, floor)
         logs = _log_gaussians(samples, squares, mixture.means, mixture.covariances, covariance_type)
         logs += np.log(mixture.weights).astype(logs.dtype)
         highest = logs.max(axis=1, keepdims=True)
@@ -229,7 +233,7 @@ def _maximise_likelihood(
     return mixture, current
 
 
-def _maximise(
+def maximise(
     samples: FloatArray,
     squares: FloatArray | None,
     masses: FloatArray,

@@ -26,7 +26,7 @@ LARGEST = {"n_segments": 1000, "n_eigenpairs": 5000, "n_energies": 1000}
 LEAST, MOST = 1e-6, 1e6
 """Sizes of numbers in a model: spreads lie between them, their squares bound variances. Beyond, single precision would
 lose a signature's digits, or overflow."""
-MOST_COMPONENTS, MOST_REGIONS = 1100, 400
+MOST_COMPONENTS, MOST_REGIONS, MOST_POSES = 1100, 400, 10_000
 KINDS = ("region", "sided")
 """Of regions: wholes, and segments by which left and right are told."""
 MAX_BYTES = 20 * 2**20
@@ -86,6 +86,8 @@ def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], Covariance
                 "handedness": (r, PLANES), "groups": (), "noise": (4,),
             }  # fmt: skip
             grouped |= {f"{kind}_{name}": shape for name, shape in of_regions.items()}
+    content.setdefault("usual_scores", [])  # older programs wrote none
+    n_poses = _length(content, "usual_scores", MOST_POSES)
     shapes = {"shared": (d,), "diag": (k, d), "spherical": (k,), "tied": (d, d), "full": (k, d, d)}
     if covariance_type not in get_args(CovarianceType):
         raise ModelFileError(f"the model is damaged: unknown covariance type {covariance_type!r}")
@@ -93,7 +95,7 @@ def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], Covariance
         name: _array(content, name, shape)
         for name, shape in {
             "centre": (d,), "spread": (d,), "weights": (k,), "means": (k, d), "covariances": shapes[covariance_type],
-            **grouped,
+            "usual_scores": (n_poses,), **grouped,
         }.items()
     }  # fmt: skip
     if grouped:

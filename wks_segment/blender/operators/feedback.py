@@ -94,6 +94,14 @@ def has_labelled_mesh(cls: type[bpy.types.Operator], context: bpy.types.Context)
     return True
 
 
+def has_model(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """For `poll`: whether this scene has a model; sets the message if not."""
+    if not context.scene.wks_segment.model:
+        cls.poll_message_set("No model yet: use Learn and Segment, or import a model")
+        return False
+    return True
+
+
 def no_job_runs(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """For `poll`: whether no job is running; sets the message if one is."""
     if desk_of(context).job is not None:

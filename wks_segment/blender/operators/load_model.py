@@ -1,4 +1,4 @@
-"""Load Model."""
+"""Import Model."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from bpy.props import StringProperty
 from bpy_extras.io_utils import ImportHelper
 
 from ...core import ModelFileError, PoseSegmentation
+from .. import models
 
 
 class WKS_SEGMENT_OT_load_model(bpy.types.Operator, ImportHelper):
-    """Load a model from a file into this scene, in the place of the one that is there"""
+    """Add a model from a file to those of this scene, and use it"""
 
     bl_idname = "wks_segment.load_model"
-    bl_label = "Load Model"
+    bl_label = "Import Model"
     bl_options = {"REGISTER", "UNDO"}
 
     filename_ext = ".json"
@@ -28,8 +29,7 @@ class WKS_SEGMENT_OT_load_model(bpy.types.Operator, ImportHelper):
         except (ModelFileError, OSError) as error:
             self.report({"ERROR"}, f"{path.name} was not loaded: {error}")
             return {"CANCELLED"}
-        settings = context.scene.wks_segment
-        settings.keep_notes(model.part_notes_)
-        settings.keep_model(model, [f"From {path.name}", f"{model.n_segments_} segments"])
+        summary = [f"From {path.name}", f"{model.n_segments_} segments"]
+        models.add(context.scene.wks_segment, model, path.stem, summary)
         self.report({"INFO"}, f"Loaded a model of {model.n_segments_} segments from {path.name}")
         return {"FINISHED"}

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Generic, Protocol, TypeVar
+
 import bpy
 
+from ...core import PoseSegmentation
+from ...core.description import Progress
 from .. import tasks
 from ..errors import ChangedError, EndedError, TooLargeError, UserError
 from ..jobs import Job, desk_of, redraw
+from ..poses import Pose
 from ..session import session_of
+from ..settings import WKSSegmentSettings
+from ..watch import Watch
 from ..work import Work
 from . import feedback
 from .tunable import Tunable
@@ -16,24 +23,49 @@ WRITABLE = ("OBJECT", "POSE")
 """Modes in which Blender's undo takes note of meshes."""
 
 
-class RunsWork(Tunable):
-    """An operator that runs a `Work`; it asks before one above the user's limits, and without a window refuses it."""
+class Computes(Protocol):
+    """Work that is read, computed without Blender, and written."""
+
+    poses: list[Pose]
+    watch: Watch
+
+    @property
+    def model(self) -> PoseSegmentation:
+        """By which the poses are described."""
+
+    def compute(self, progress: Progress) -> None:
+        """The part for a thread."""
+
+
+W = TypeVar("W", bound=Computes)
+
+
+class RunsJob(Generic[W]):
+    """An operator that runs work of some kind; it asks before a job above the user's limits, and without a window
+    refuses it."""
 
     confirmed: bpy.props.BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
 
     bl_label: str
-    learns = False
-    """Whether its work is learning."""
-    verb = ""
-    """What it has done, for the status bar."""
     job: Job
-    work: Work
+    work: W
     asked = False
     """Whether the next call of `execute` is the answer to a question in the window."""
 
-    def read(self, context: bpy.types.Context) -> Work:
+    def read(self, context: bpy.types.Context) -> W:
         """Read what the work needs; UserError if it cannot be used."""
         raise NotImplementedError
+
+    def written(self, context: bpy.types.Context) -> set[str]:
+        """Write what was computed and report."""
+        raise NotImplementedError
+
+    def take(self, settings: WKSSegmentSettings) -> None:
+        """Hand what the operator was given to the scene."""
+
+    def again(self, context: bpy.types.Context) -> W | None:
+        """Of what is adjusted, the work with other settings; None where there is nothing to begin with."""
+        return None
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Called by a button or a shortcut."""
@@ -63,18 +95,6 @@ class RunsWork(Tunable):
             return self.written(context)
         except UserError as error:
             return self.refused(error)
-
-    @property
-    def is_adjusted(self) -> bool:
-        """Whether it was undone to be done with other settings, in the panel Adjust Last Operation."""
-        return bool(self.options.is_repeat)  # type: ignore[attr-defined]  # an operator's own
-
-    def again(self, context: bpy.types.Context) -> Work | None:
-        """Of what is adjusted, the work with other settings; None where there is nothing to begin with."""
-        before = session_of(context).work
-        if not self.is_adjusted or before is None or before.learns != self.learns:
-            return None
-        return before.again(context.scene.wks_segment)
 
     def started(self, context: bpy.types.Context) -> set[str]:
         """Read, and let a thread compute; UserError if it cannot be done."""
@@ -124,12 +144,38 @@ class RunsWork(Tunable):
         self.job.end("its window was closed")
         desk_of(context).clear(self.job.epitaph)
 
-    def checked(self, context: bpy.types.Context) -> Work:
+    def checked(self, context: bpy.types.Context) -> W:
         """What was read; TooLargeError unless it is within the limits or the user has agreed."""
         work = self.read(context)
         if not self.confirmed:
             tasks.check_limits(work.model, work.poses, context.scene.wks_segment)
         return work
+
+    def refused(self, error: UserError) -> set[str]:
+        """Tell why."""
+        self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]  # an operator's own
+        return {"CANCELLED"}
+
+
+class RunsWork(Tunable, RunsJob[Work]):
+    """An operator that runs a `Work`: it labels, and shows the settings that labels follow."""
+
+    learns = False
+    """Whether its work is learning."""
+    verb = ""
+    """What it has done, for the status bar."""
+
+    @property
+    def is_adjusted(self) -> bool:
+        """Whether it was undone to be done with other settings, in the panel Adjust Last Operation."""
+        return bool(self.options.is_repeat)  # type: ignore[attr-defined]  # an operator's own
+
+    def again(self, context: bpy.types.Context) -> Work | None:
+        """Of what is adjusted, the work with other settings; None where there is nothing to begin with."""
+        before = session_of(context).work
+        if not self.is_adjusted or before is None or before.learns != self.learns:
+            return None
+        return before.again(context.scene.wks_segment)
 
     def written(self, context: bpy.types.Context) -> set[str]:
         """Write what was computed and report."""
@@ -138,8 +184,3 @@ class RunsWork(Tunable):
         if self.work.wanted.colors:
             feedback.show_colors(context)
         return feedback.finish(self, self.verb, self.work.report)
-
-    def refused(self, error: UserError) -> set[str]:
-        """Tell why."""
-        self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]  # an operator's own
-        return {"CANCELLED"}

@@ -1,4 +1,4 @@
-"""Save Model."""
+"""Export Model."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from ..errors import UserError
 
 
 class WKS_SEGMENT_OT_save_model(bpy.types.Operator, ExportHelper):
-    """Save the learned model to a file, for other scenes and for the command line"""
+    """Save the active model to a file, with names and colors, for other scenes and for the command line"""
 
     bl_idname = "wks_segment.save_model"
-    bl_label = "Save Model"
+    bl_label = "Export Model"
 
     filename_ext = ".json"
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
@@ -24,7 +24,7 @@ class WKS_SEGMENT_OT_save_model(bpy.types.Operator, ExportHelper):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if not context.scene.wks_segment.model:
-            cls.poll_message_set("No model yet: use Learn and Segment, or load a model")
+            cls.poll_message_set("No model yet: use Learn and Segment, or import a model")
             return False
         return True
 

@@ -1,0 +1,243 @@
+"""Whole batches: `python -m benchmarks.batches CHARACTERS [--files 200] [--output demo/batches] [--runs NAME,…]`.
+
+Writes frames of the characters as files, one of which is broken and one of which hangs Blender's importer for ever (its
+materials are a pipe that nobody writes to), and learns a model of each: with one process, with two, with two Dask
+workers, with two Dask workers of which one is killed, and with two processes that are killed and resumed. Prints a
+Markdown table of seconds, throughput and results; models must be the same byte for byte. Then what another number of
+segments takes with a cache, beside the first. Needs Linux or macOS.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any
+
+from benchmarks.speed import table_row
+
+SETTINGS = ("--segments", "6", "--no-thumbnails")
+TIME_LIMIT = 60
+"""Seconds for a file: the one that hangs takes all of them."""
+BROKEN, HANGS, PIPE = "broken.glb", "0_hangs.obj", "nobody_writes"
+"""What hangs comes first, so that nothing waits for it in the end."""
+CACHED_FRAMES, FIRST, SECOND = 5, "8", "6"
+WRITE_FRAMES = """
+import os, random, sys
+import bpy
+source, target, count = sys.argv[1], sys.argv[2], int(sys.argv[3])
+bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+bpy.ops.import_scene.gltf(filepath=source)
+turn, scene = random.Random(0), bpy.context.scene
+rigs = [obj for obj in bpy.data.objects if obj.type == "ARMATURE"]
+ranges = [action.frame_range for action in bpy.data.actions]
+first, last = (ranges[0][0], ranges[0][1]) if ranges else (1, count)
+for i in range(count):
+    scene.frame_set(round(first + (last - first) * (i + 0.5) / count))
+    if not ranges:
+        for rig in rigs:
+            for bone in rig.pose.bones:
+                bone.rotation_mode = "XYZ"
+                bone.rotation_euler = [turn.uniform(-0.35, 0.35) if bone.parent else 0.0 for _ in range(3)]
+        bpy.context.view_layer.update()
+    bpy.ops.wm.obj_export(filepath=f"{target}_{i:02d}.obj", export_materials=False)
+sys.stdout.flush()
+os._exit(0)
+"""
+
+
+def main() -> None:
+    """Run them."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("characters", type=Path, help="a folder of .glb files")
+    parser.add_argument("--files", type=int, default=200)
+    parser.add_argument("--output", type=Path, default=Path("demo/batches"))
+    parser.add_argument("--runs", default=",".join([*RUNS, "cached"]))
+    options = parser.parse_args()
+    shutil.rmtree(options.output, ignore_errors=True)
+    options.output.mkdir(parents=True)
+    inputs = options.output / "in"
+    write_inputs(sorted(options.characters.glob("*.glb")), inputs, options.files)
+    print("| run | seconds | files a minute | times one process | done | failed | the same models |")
+    print("|" + "---|" * 7)
+    first = 0.0
+    for name in options.runs.split(","):
+        if name == "cached":
+            cached(sorted(options.characters.glob("*.glb")), options.output)
+            continue
+        out = options.output / name
+        begun = time.monotonic()
+        result = RUNS[name](inputs, out)
+        seconds = time.monotonic() - begun
+        first = first or seconds
+        same = sum(_same(path, options.output / "one" / path.name) for path in out.glob("*.json"))
+        failed = "; ".join(f"{Path(path).name}: {reason[:60]}" for path, reason in result["failed"].items())
+        print(
+            table_row([
+                result.get("name") or NAMES[name], f"{seconds:.0f}", f"{60 * options.files / seconds:.1f}",
+                f"{first / seconds:.2f}", str(result["done"]), failed, str(same),
+            ]),
+            flush=True,
+        )  # fmt: skip
+
+
+def write_inputs(characters: list[Path], folder: Path, count: int) -> None:
+    """Frames of the characters, about as many of each, and the two that go wrong."""
+    folder.mkdir()
+    for i, path in enumerate(characters):
+        frames = len(range(i, count - 2, len(characters)))
+        if frames:
+            command = [sys.executable, "-c", WRITE_FRAMES, str(path), str(folder / path.stem), str(frames)]
+            subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=600)
+    (folder / BROKEN).write_bytes(characters[0].read_bytes()[:20_000])
+    os.mkfifo(folder / PIPE)
+    (folder / HANGS).write_text(f"mtllib {PIPE}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+
+
+def one(inputs: Path, out: Path) -> dict[str, Any]:
+    """One process."""
+    return _finished(_batch(inputs, out, "--processes", "1"))
+
+
+def two(inputs: Path, out: Path) -> dict[str, Any]:
+    """Two processes."""
+    return _finished(_batch(inputs, out, "--processes", "2"))
+
+
+def dask(inputs: Path, out: Path) -> dict[str, Any]:
+    """Two Dask workers."""
+    with _cluster() as (address, _):
+        return _finished(_batch(inputs, out, "--scheduler", address))
+
+
+def killed_worker(inputs: Path, out: Path) -> dict[str, Any]:
+    """Two Dask workers, one of which is killed when a third of the files are done."""
+    with _cluster() as (address, workers):
+        process = _batch(inputs, out, "--scheduler", address)
+        _wait_for(out, len(list(inputs.iterdir())) // 3, process)
+        workers[0].kill()
+        return _finished(process)
+
+
+def resumed(inputs: Path, out: Path) -> dict[str, Any]:
+    """Two processes, killed when half of the files are done, and the same command with --resume."""
+    process = _batch(inputs, out, "--processes", "2")
+    _wait_for(out, len(list(inputs.iterdir())) // 2, process)
+    process.kill()
+    process.wait()
+    before = _lines(out)
+    result = _finished(_batch(inputs, out, "--processes", "2", "--resume"))
+    result["name"] = f"killed after {before} files, resumed: {result['now']} done then"
+    return result
+
+
+RUNS: dict[str, Callable[[Path, Path], dict[str, Any]]] = {
+    "one": one, "two": two, "dask": dask, "killed_worker": killed_worker, "resumed": resumed,
+}  # fmt: skip
+NAMES = {"one": "1 process", "two": "2 processes", "dask": "2 Dask workers", "killed_worker": "… one of them killed"}
+
+
+def cached(characters: list[Path], output: Path) -> None:
+    """What `learn` takes for another number of segments, with the signatures and mixtures of the first in a cache."""
+    import bpy
+
+    import wks_segment.blender
+    from wks_segment.blender import tasks
+    from wks_segment.blender.characters import mesh_objects
+    from wks_segment.blender.commands.common import characters_in
+    from wks_segment.blender.files import open_files
+    from wks_segment.blender.poses import own_frames, read_frames
+    from wks_segment.blender.report import Report
+    from wks_segment.blender.terminal import only_result_on_stdout
+    from wks_segment.core import DiskCache, PoseSegmentation
+
+    wks_segment.blender.register()
+    print(f"\n| {CACHED_FRAMES} poses | {FIRST} segments, s | {SECOND} from the cache, s | share |\n|{'---|' * 4}")
+    shares = []
+    cache = DiskCache(output / "cache")
+    for path in characters:
+        with only_result_on_stdout():
+            (objects,) = open_files([path])
+            if not mesh_objects(objects):
+                continue
+            (character,) = characters_in(path, objects, None)
+            poses = read_frames(bpy.context, character, own_frames(bpy.context.scene, character, CACHED_FRAMES))
+        seconds = []
+        for number in (FIRST, SECOND):
+            begun = time.monotonic()
+            model = PoseSegmentation(n_segments=int(number))
+            tasks.learn(model, poses, Report([]), lambda stage, share: None, cache)
+            seconds.append(time.monotonic() - begun)
+        shares.append(seconds[1] / seconds[0])
+        print(table_row([path.stem, *(f"{each:.2f}" for each in seconds), f"{shares[-1]:.3f}"]), flush=True)
+    print(table_row(["**mean**", "", "", f"**{sum(shares) / len(shares):.3f}**"]))
+    wks_segment.blender.unregister()
+
+
+def _batch(inputs: Path, out: Path, *arguments: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "wks_segment", "batch", "learn", str(inputs), "--output", str(out), "--json"]
+    command += ["--time-limit", str(TIME_LIMIT), *SETTINGS, *arguments]
+    return subprocess.Popen(command, text=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+
+
+def _finished(process: subprocess.Popen[str]) -> dict[str, Any]:
+    printed, _ = process.communicate()
+    result: dict[str, Any] = json.loads(printed)
+    return result
+
+
+def _lines(out: Path) -> int:
+    path = out / "batch.jsonl"
+    return len(path.read_text(encoding="utf-8").splitlines()) if path.exists() else 0
+
+
+def _wait_for(out: Path, count: int, process: subprocess.Popen[str]) -> None:
+    """Until so many files are in the list."""
+    while _lines(out) < count and process.poll() is None:
+        time.sleep(0.1)
+
+
+@contextmanager
+def _cluster() -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
+    """The address of a scheduler on this machine, and its two workers; all of it gone afterwards."""
+    processes: list[subprocess.Popen[str]] = []
+
+    def start(*arguments: str, until: str) -> str:
+        command = [sys.executable, "-m", *arguments, "--no-dashboard", "--host", "127.0.0.1"]
+        process = subprocess.Popen(command, text=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+        processes.append(process)
+        stream: IO[str] | None = process.stderr
+        assert stream is not None
+        for line in stream:
+            if found := re.search(until, line):
+                return found[0]
+        raise RuntimeError(f"{command}: ended with {process.wait()}")
+
+    try:
+        scheduler = start("distributed.cli.dask_scheduler", "--port", "0", until=r"tcp://127\.0\.0\.1:\d+")
+        for _ in range(2):
+            worker = ("distributed.cli.dask_worker", scheduler, "--no-nanny", "--nthreads", "1")
+            start(*worker, until="Registered to")
+        yield scheduler, processes[1:]
+    finally:
+        for process in processes:
+            process.kill()
+            process.communicate()
+
+
+def _same(one: Path, other: Path) -> bool:
+    return other.is_file() and one.read_bytes() == other.read_bytes()
+
+
+if __name__ == "__main__":
+    main()
+    sys.stdout.flush()
+    os._exit(0)  # some versions of bpy crash at a normal exit

@@ -1,0 +1,49 @@
+"""A child in the place of Blender, started at once: does with a file what the file says.
+
+Loads the module that serves calls by itself, without all that the package imports.
+"""
+
+import importlib.util
+import os
+import sys
+import time
+from pathlib import Path
+
+CHILD = Path(__file__).resolve().parents[2] / "wks_segment" / "batch" / "child.py"
+spec = importlib.util.spec_from_file_location("child", CHILD)
+child = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(child)
+calls = []
+
+
+def run(arguments):
+    _, source, *rest = arguments
+    calls.append(source)
+    print('{"error": "junk on standard output"}', flush=True)
+    text = Path(source).read_text()
+    if text == "crash" or (text == "crash if not first" and len(calls) > 1):
+        print("something is wrong", file=sys.stderr, flush=True)
+        os.kill(os.getpid(), 9)
+    if text == "leave":
+        os._exit(7)
+    if text.startswith("sleep"):
+        time.sleep(float(text.split()[1]))
+    if text == "eat":
+        eaten = bytearray(b"x" * 600_000_000)
+        time.sleep(60)
+        del eaten
+    if text == "refuse":
+        return child.Answer(None, f"{source}: there is no mesh in this file")
+    if text == "raise":
+        raise RuntimeError("unforeseen")
+    for argument in rest:
+        if argument.startswith("--out"):
+            Path(argument.partition("=")[2]).write_text(f"{text} {os.getpid()} {len(calls)}")
+        if argument == "--beside":
+            beside = next(each.partition("=")[2] for each in rest if each.startswith("--out"))
+            Path(beside).with_suffix(".mtl").write_text("beside")
+    return child.Answer({"segments": 3, "warnings": ["<a> warning"], "other": float("nan")})
+
+
+print("a greeting", flush=True)
+sys.exit(child.serve(Path(sys.argv[1]), run))

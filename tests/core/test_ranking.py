@@ -1,0 +1,167 @@
+"""Which model fits: comparable between settings, and how sure."""
+
+import json
+
+import numpy as np
+import pytest
+from shapes import creature, icosphere
+
+from wks_segment.core import PoseSegmentation, TriangleMesh, described_alike, rank, retrieve
+from wks_segment.core.explained import left_out_likelihoods, likely_mean
+from wks_segment.core.mixture import fit_mixture
+from wks_segment.core.ranking import least_usual, ranking_of, spread_evenly
+
+QUICK = {"n_segments": 3, "n_eigenpairs": 30, "n_energies": 20}
+STRETCHED = np.array([1.0, 1.0, 4.0])
+
+
+def stretched(bend):
+    """Another class of shapes."""
+    mesh = creature(bend, 3)
+    return TriangleMesh(mesh.vertices * STRETCHED, mesh.faces)
+
+
+CLASSES = {"creature": lambda bend: creature(bend, 3), "stretched": stretched}
+BENDS = (0.0, 0.3, 0.6)
+
+
+@pytest.fixture(scope="module")
+def models():
+    return [PoseSegmentation(**QUICK).fit([make(bend) for bend in BENDS]) for make in CLASSES.values()]
+
+
+def ranked(models, mesh):
+    return rank(models, [[model.describe(mesh)] for model in models])
+
+
+@pytest.mark.parametrize("kind", [0, 1])
+def test_the_model_of_the_class_is_first(models, kind):
+    found = ranked(models, list(CLASSES.values())[kind](0.45))
+    assert [place.index for place in found.ranks] == [kind, 1 - kind]
+    assert found.verdict == "sure"
+    assert found.best.fits
+    assert sum(place.probability for place in found.ranks) == pytest.approx(1)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"n_energies": 40}, {"n_eigenpairs": 60}, {"scaling": "raw"}, {"preset": "paper"}, {"covariance_type": "diag"},
+        {"n_segments": 6}, {"covariance_type": "full"},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_models_of_other_settings_are_comparable(models, other):
+    """Whichever of the classes has the other settings, each shape goes to its own."""
+    makers = list(CLASSES.values())
+    for kind, make in enumerate(makers):
+        mixed = list(models)
+        mixed[kind] = PoseSegmentation(**QUICK | other).fit([make(bend) for bend in BENDS])
+        assert [ranked(mixed, of(0.45)).best.index for of in makers] == [0, 1]
+
+
+def test_a_shape_of_no_class_fits_nothing(models):
+    assert ranked(models, icosphere(3)).verdict == "nothing fits"
+
+
+def test_alike_models_leave_it_unsure(models):
+    found = ranked([models[0], models[0]], creature(0.45, 3))
+    assert found.verdict == "unsure"
+    assert found.best.probability == pytest.approx(0.5)
+    assert [place.index for place in found.ranks] == [0, 1]
+
+
+def test_a_model_alone_is_sure_as_long_as_it_fits(models):
+    assert ranked(models[:1], creature(0.45, 3)).verdict == "sure"
+    assert ranked(models[:1], icosphere(3)).verdict == "nothing fits"
+
+
+def test_usual_scores_are_near_those_of_unseen_poses(models):
+    for model, make in zip(models, CLASSES.values(), strict=True):
+        assert model.usual_scores_.shape == (3,)
+        assert np.mean(model.usual_scores_) == pytest.approx(model.comparable_score(make(0.45)), abs=0.3)
+        learned = np.mean([model.comparable_score(make(bend)) for bend in BENDS])
+        assert model.usual_scores_.mean() < learned
+
+
+def test_one_learned_pose_has_its_own_score():
+    mesh = creature(0.0, 3)
+    model = PoseSegmentation(**QUICK).fit([mesh])
+    assert model.usual_scores_ == pytest.approx([model.comparable_score(mesh)], abs=1e-5)
+
+
+def test_usual_scores_are_in_the_file_and_may_be_missing(models):
+    text = models[0].to_json()
+    np.testing.assert_array_equal(PoseSegmentation.from_json(text).usual_scores_, models[0].usual_scores_)
+    content = json.loads(text)
+    del content["usual_scores"]
+    older = PoseSegmentation.from_json(json.dumps(content))
+    assert older.usual_scores_.size == 0
+    assert ranked([older], stretched(0.45)).best.fits, "nothing is known of what is usual"
+
+
+def test_scores_change_no_label(models):
+    """`score` is what scripts rely on: the mean over all of the area."""
+    model, mesh = models[0], creature(0.45, 3)
+    pose = model.describe(mesh)
+    assert model.score(pose) != pytest.approx(model.comparable_score(pose))
+    assert model.score(mesh) == pytest.approx(model.score(pose))
+
+
+def test_the_least_likely_tenth_does_not_count():
+    shares = np.full(20, 0.05)
+    values = np.arange(20.0)
+    values[:2] = -1e9
+    assert likely_mean(values, shares) == pytest.approx(values[2:].mean())
+    assert likely_mean(values[::-1], shares) == pytest.approx(values[2:].mean())
+    assert likely_mean(np.array([-4.0, 1.0]), np.array([0.2, 0.8])) == pytest.approx((-4 * 0.1 + 0.8) / 0.9)
+
+
+def test_what_is_left_out_is_less_likely():
+    generator = np.random.default_rng(0)
+    group = np.repeat(np.arange(3), 100)
+    samples = generator.standard_normal((300, 4)) + group[:, None]
+    shares = np.full(300, 1 / 300)
+    for kind in ("shared", "diag", "spherical", "tied", "full"):
+        mixture = fit_mixture(samples, shares, 3, kind, 0)
+        without = left_out_likelihoods(mixture, samples, shares, group)
+        assert without.mean() < mixture.log_likelihoods(samples).mean()
+
+
+def test_far_below_the_usual_is_another_class():
+    assert least_usual(np.array([])) == -np.inf
+    assert least_usual(np.array([2.0])) == pytest.approx(1.5)
+    assert least_usual(np.array([1.0, 2.0, 3.0])) == pytest.approx(2.0 - 3.0)
+    assert ranking_of(np.array([1.0, 1.2]), [np.array([1.0]), np.array([2.0])], "aa").verdict == "nothing fits"
+
+
+def test_scores_count_as_they_are_between_models_of_the_same_settings():
+    usual = [np.array([1.0]), np.array([2.0])]
+    assert ranking_of(np.array([1.1, 1.9]), usual, "aa").best.index == 1
+    assert ranking_of(np.array([1.1, 1.9]), usual, "ab").best.index == 0
+    assert ranking_of(np.array([1.1, 1.9]), [np.array([])] * 2, "ab").best.index == 1
+
+
+def test_models_are_described_together_where_they_can_be(models):
+    more = [*models, PoseSegmentation(n_energies=7), PoseSegmentation(**QUICK, pieces="separate")]
+    assert described_alike(more) == [[0, 1], [2], [3]]
+
+
+def test_nothing_to_rank_is_refused(models):
+    with pytest.raises(ValueError, match="there are 0 models"):
+        rank([], [])
+    with pytest.raises(ValueError, match="there are 2 models, and poses for 1"):
+        rank(models, [[models[0].describe(creature(0.0, 3))], []])
+
+
+def test_queries_of_all_classes_are_counted(models):
+    queries = {name: [models[0].describe(make(bend)) for bend in (0.15, 0.45)] for name, make in CLASSES.items()}
+    found = retrieve(dict(zip(CLASSES, models, strict=True)), queries)
+    np.testing.assert_array_equal(found.confusion, [[2, 0], [0, 2]])
+    assert (found.right, found.asked, found.rate) == (4, 4, 1.0)
+    assert sum(map(sum, found.verdicts.values())) == 4
+
+
+def test_learned_shapes_are_spread():
+    assert spread_evenly(20, 5) == [0, 4, 8, 12, 16]
+    assert spread_evenly(8, 5) == [0, 1, 3, 4, 6]

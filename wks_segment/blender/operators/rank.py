@@ -1,0 +1,41 @@
+"""Rank Models."""
+
+from __future__ import annotations
+
+import bpy
+
+from .. import models
+from ..preferences import model_folder
+from ..ranking import RankWork
+from . import feedback
+from .running import RunsJob
+
+
+class WKS_SEGMENT_OT_rank(RunsJob[RankWork], bpy.types.Operator):
+    """Say which models of this scene and of the model folder fit the active character, and how surely"""
+
+    bl_idname = "wks_segment.rank"
+    bl_label = "Rank Models"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not (context.scene.wks_segment.model or models.in_folder(model_folder(context))):
+            cls.poll_message_set("No model yet: learn one, import one, or set Model Folder in the preferences")
+            return False
+        return (
+            feedback.no_job_runs(cls, context)
+            and feedback.in_object_mode(cls, context)
+            and feedback.has_selected_mesh(cls, context)
+        )
+
+    def read(self, context: bpy.types.Context) -> RankWork:
+        """Read the models and the active character."""
+        return RankWork.read(context)
+
+    def written(self, context: bpy.types.Context) -> set[str]:
+        """Show the ranking and report."""
+        self.report({"INFO"}, self.work.write())
+        for warning in self.work.report.warnings:
+            self.report({"WARNING"}, warning)
+        return {"FINISHED"}
