@@ -1,5 +1,7 @@
 """Which model fits: in the window's list, on the command line, and the paper's protocol on a folder."""
 
+from unittest.mock import MagicMock
+
 import bpy
 import numpy as np
 import pytest
@@ -112,6 +114,19 @@ def test_models_of_the_folder_take_part_and_are_added_when_applied(two, tmp_path
     assert two.ranking[0].path == ""
     assert OPS.apply_ranked() == {"FINISHED"}
     assert len(two.models) == 1
+
+
+def test_panel_shows_the_ranking(two):
+    OPS.rank()
+    panel = MagicMock()
+    panel_models.WKS_SEGMENT_PT_models.ranking(panel, two)
+    column = panel.layout.column.return_value
+    assert column.label.call_args_list[0].kwargs["text"] == "Unseen: Limbed fits, surely"
+    row = column.row.return_value
+    assert [call.kwargs["text"] for call in row.operator.call_args_list] == ["Use", "Use"]
+    shown = [call.kwargs["text"] for call in row.row.return_value.label.call_args_list]
+    assert shown[::2] == ["Limbed", "Box"]
+    assert shown[1].endswith(" %")
 
 
 # Command line
