@@ -274,10 +274,10 @@ def kept():
     bpy.context.preferences.addons.remove(addon)
 
 
-def test_preferences_hold_where_there_are_some(kept):
-    kept.model_folder, kept.cache_megabytes, kept.live_seconds = "//models", 7, 0.5
+def test_preferences_hold_where_there_are_some(kept, tmp_path):
+    kept.model_folder, kept.cache_megabytes, kept.live_seconds = str(tmp_path), 7, 0.5
     assert preference(bpy.context, "live_seconds") == 0.5
-    assert not model_folder(bpy.context).startswith("//")
+    assert model_folder(bpy.context) == str(tmp_path)
     session = session_of(bpy.context)
     assert session.cache.limit == 7_000_000
     bpy.context.preferences.addons[PACKAGE].preferences.cache_megabytes = 9
