@@ -95,6 +95,17 @@ def test_without_a_model_or_a_ranking_the_buttons_are_grey(settings):
     assert not OPS.apply_ranked.poll()
 
 
+def test_an_empty_model_folder_is_told(settings, tmp_path, monkeypatch):
+    from wks_segment.blender.operators import rank as operator
+
+    for module in (ranking, operator):
+        monkeypatch.setattr(module, "model_folder", lambda context: str(tmp_path))
+    select(limbed())
+    assert OPS.rank.poll()
+    with pytest.raises(RuntimeError, match="No model yet: learn one, import one, or set Model Folder"):
+        OPS.rank()
+
+
 def test_models_of_the_folder_take_part_and_are_added_when_applied(two, tmp_path, monkeypatch):
     two.active_model = 0
     OPS.save_model(filepath=str(tmp_path / "folder limbed.json"))
