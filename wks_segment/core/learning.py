@@ -11,7 +11,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from .cache import Cache
-from .grouping import Contacts, Ground, Grouping
+from .grouping import Ground, Grouping
 from .layout import Layout, layout_key
 from .mesh import FloatArray, IntArray
 from .mixture import CovarianceType, GaussianMixture, TooFewSamplesError, fit_mixtures
@@ -55,6 +55,9 @@ class Candidates:
         """
         layout = self.layout
         groupings = [Grouping.of(mean) for mean in layout.contacts]
+        if len(layout.grounds) > 1 and layout.samples is None:
+            # What is compared is what it will be: bodies differ more in what is crumbs than poses do.
+            groupings = [self._without_scattered(i, grouping) for i, grouping in enumerate(groupings)]
         if len(layout.grounds) == 1:
             losses = [-float(grouping.certainties[self.number(grouping) - 1]) for grouping in groupings]
         elif layout.samples is None:
@@ -70,10 +73,7 @@ class Candidates:
                 for grouping, kept, mixture in zip(groupings, layout.samples, layout.mixtures, strict=True)
             ]
         best = int(np.argmin(losses))
-        grouping = self._without_scattered(
-            layout.contacts[best], groupings[best], layout.grounds, layout.likeliest[best]
-        )
-        return layout.mixtures[best], grouping
+        return layout.mixtures[best], self._without_scattered(best, groupings[best])
 
     def _unlike_parts(self, grouping: Grouping, grounds: Sequence[Ground], components: Sequence[IntArray]) -> float:
         """How unlike the parts of the poses the regions are, given the likeliest component of each face in each."""
@@ -87,23 +87,25 @@ class Candidates:
         labels = np.stack([(each @ np.eye(number)[grouping.groups(number)]).argmax(axis=1) for each in posteriors])
         return float((labels[:, None] != labels).mean())
 
-    def _without_scattered(
-        self, contacts: Contacts, grouping: Grouping, grounds: Sequence[Ground], components: Sequence[IntArray]
-    ) -> Grouping:
+    def _without_scattered(self, index: int, grouping: Grouping) -> Grouping:
         """Joined anew until no segment is crumbs everywhere: first what is, to what it lies on.
 
-        Given the likeliest component of each face in each pose.
+        Of the mixture with that index. On poses of one mesh a segment must be whole in half of them; of several meshes
+        one may have a part that no other has.
         """
+        layout = self.layout
+        contacts, components = layout.contacts[index], layout.likeliest[index]
+        least = 1 if layout.samples is None else len(layout.grounds) / 2
         scattered = np.zeros(len(contacts.areas), dtype=bool)
         for _ in range(REGROUPED):
             number = self.number(grouping)
             group, seen = grouping.groups(number), np.zeros(number)
-            for ground, of_faces in zip(grounds, components, strict=True):
+            for ground, of_faces in zip(layout.grounds, components, strict=True):
                 labels, original = group[of_faces], ground.surface.original
                 region = connected_regions(labels, ground.adjacency)
                 large = np.bincount(region, original.face_areas) >= MIN_SHARE * original.area
                 seen[np.unique(labels[large[region]])] += 1
-            lasting = seen >= len(grounds) / 2
+            lasting = seen >= least
             if lasting.all():
                 break
             scattered |= ~lasting[group]
