@@ -48,9 +48,7 @@ def parts(surface: Surface, adjacency: FaceAdjacency, borders: FloatArray, curva
     return np.stack([normalized_cut(patch, areas, adjacency.pairs, borders, gain) for gain in GAINS])
 
 
-def normalized_cut(
-    patch: IntArray, areas: FloatArray, pairs: IntArray, borders: FloatArray, gain: float
-) -> IntArray:
+def normalized_cut(patch: IntArray, areas: FloatArray, pairs: IntArray, borders: FloatArray, gain: float) -> IntArray:
     """Let patches grow together, best pair first, while that lowers the sum of border by area by `gain`.
 
     Parameters
