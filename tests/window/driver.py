@@ -33,6 +33,8 @@ HEADER = 26
 """Height of the header of a sub-panel."""
 ROW = 21
 """Height of a row in a list."""
+FIRST_FIELD, FIELD = 45, 23
+"""Where the first field of the last operator is, below its top, and how far the next."""
 PATIENCE = 600
 """Seconds after which Blender is taken to hang."""
 
@@ -275,15 +277,16 @@ class RealBlender:
         self.type(text)
         self.key("Return")
 
-    def adjust(self, name: str, text: str) -> None:
-        """Give a field below the viewport, where the last operator is adjusted, a value; it is opened if need be."""
+    def adjust(self, field: int, text: str) -> None:
+        """Give a field below the viewport, where the last operator is adjusted, a value; it is opened if need be.
+
+        Fields are counted from 0: of what is there Blender tells nothing.
+        """
         x, y, width, height = self.ask("region", "HUD")
         if height < 2 * HEADER:
             self.click(x + width // 2, y + height // 2)
-        found = self.ask("button", name, "HUD")
-        if not isinstance(found, list):
-            raise WindowError(f"the last operator has no {name}: {', '.join(sorted(found))}")
-        self.click(*found, repeat=2)
+            x, y, width, height = self.ask("region", "HUD")
+        self.click(x + int(0.7 * width), y + FIRST_FIELD + FIELD * field, repeat=2)
         self.key("ctrl+a")
         self.type(text)
         self.key("Return")

@@ -13,6 +13,7 @@ import traceback
 import zlib
 from math import radians
 
+import bmesh
 import bpy
 import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
@@ -134,13 +135,14 @@ def segments(name):
 
 def rows():
     """The list of segments: [name, share, hidden, number of selected faces] of each."""
-    obj = bpy.context.view_layer.objects.active
-    mesh = obj.data
-    if obj.mode == "EDIT":
-        obj.update_from_editmode()
-    parts, chosen = (_values(mesh, name) for name in ("wks_segment", ".select_poly"))
+    mesh = _window().view_layer.objects.active.data
+    chosen = []
+    if mesh.is_editmode:  # what the mesh itself holds is that of before
+        faces = bmesh.from_edit_mesh(mesh).faces
+        part = faces.layers.int["wks_segment"]
+        chosen = [face[part] for face in faces if face.select]
     return [
-        [item.name, item.share, item.hidden, int(chosen[parts == item.number].sum())]
+        [item.name, item.share, item.hidden, chosen.count(item.number)]
         for item in _window().scene.wks_segment.segments
     ]
 

@@ -6,6 +6,9 @@ BODY = "Creature"
 FEWEST_CLICKS = 12
 """Clicks from the zip to a baked ID map, at most."""
 
+SEGMENTS, SMOOTHNESS = 0, 3
+"""Fields of Learn and Segment where it is adjusted."""
+
 
 @pytest.fixture
 def learned(window):
@@ -73,15 +76,15 @@ def rename(window, index, name):
 
 
 def test_the_last_operation_is_adjusted_without_learning_again(learned, shot):
-    learned.adjust("n_segments", "5")
+    learned.adjust(SEGMENTS, "5")
     learned.wait_for("n_segments", BODY, 5)
     shot("five segments")
     before = learned.ask("contents", BODY)
-    learned.adjust("smoothness", "0")
+    learned.adjust(SMOOTHNESS, "0")
     learned.settle()
     assert learned.ask("contents", BODY) != before
     shot("not smooth")
-    learned.adjust("smoothness", "1")
+    learned.adjust(SMOOTHNESS, "1")
     learned.settle()
     assert learned.ask("contents", BODY) == before
 
@@ -113,7 +116,7 @@ def test_from_the_zip_to_a_baked_id_map(window, shot):
     window.wait_for("job_is_over")
     window.press("bake_unwrap")  # the creature has no UV map
     window.press("wks_segment.bake")
-    colors = window.wait_for("image_colors", f"{BODY} ID")
+    colors = window.wait_for("image_colors", f"{BODY} ID Map")
     shot("baked")
     assert clicks + window.clicks <= FEWEST_CLICKS
     opaque = {color for color in colors if color.endswith(" 255")}
