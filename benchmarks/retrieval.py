@@ -1,4 +1,4 @@
-"""Which class is it: the paper's section 5, by the function that `wks_segment rank` uses. Part of `benchmarks.quality`."""
+"""Which class is it: the paper's section 5, as `wks_segment rank` answers it. Part of `benchmarks.quality`."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from tests.window.driver import SUITES, RealBlender, build_zip
 
 IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
 BODY = "Creature"
-SUBPANELS = {"outputs": "write_materials", "model": "wks_segment.save_model", "advanced": "snap_to"}
+SUBPANELS = {"outputs": "write_materials", "models": "wks_segment.save_model", "advanced": "snap_to"}
 """What to look for in them."""
 BELOW = 70
 """Pixels that are shown below the last button: titles of closed sub-panels."""
@@ -47,7 +47,7 @@ def take(blender: RealBlender, folder: Path) -> None:
     viewport(blender, folder / "panel.png")
     for name, inside in {
         "outputs": "write_materials",
-        "model": "wks_segment.save_model",
+        "models": "wks_segment.save_model",
         "advanced": "snap_to",
     }.items():
         blender.find(inside)  # opens its sub-panel

@@ -217,6 +217,11 @@ def use_extension(site, zip_path, profile):
         labels.data.foreach_get("value", values)
         assert len(np.unique(values)) > 1, "all faces have the same label"
 
+    bpy.context.preferences.addons[module].preferences.model_folder = profile
+    assert bpy.ops.wks_segment.save_model(filepath=str(Path(profile) / "shared.json")) == {"FINISHED"}
+    assert bpy.ops.wks_segment.rank() == {"FINISHED"}
+    assert "shared" in [item.name for item in settings.ranking], "the model folder of the preferences is not seen"
+
     assert bpy.ops.wks_segment.clear() == {"FINISHED"}
     assert all("wks_segment" not in pose.data.attributes for pose in poses), "clear left an attribute"
 

@@ -1,12 +1,15 @@
 """The models of a scene: kept, used, renamed, copied, removed, undone; and files of the time when there was one."""
 
+from unittest.mock import MagicMock
+
 import bpy
 import numpy as np
 import pytest
 from builders import labels_of, limbed_poses, select
 
 from wks_segment.blender import models, panel_models
-from wks_segment.blender.preferences import PACKAGE, WKSSegmentPreferences, preference
+from wks_segment.blender.preferences import PACKAGE, WKSSegmentPreferences, model_folder, preference
+from wks_segment.blender.session import session_of
 from wks_segment.core import PoseSegmentation
 
 pytestmark = pytest.mark.usefixtures("scene")
@@ -260,6 +263,38 @@ def test_models_of_a_folder(two, tmp_path):
 
 def test_preferences_are_of_the_extension():
     assert WKSSegmentPreferences.bl_idname == PACKAGE == "wks_segment"
+
+
+@pytest.fixture
+def kept():
+    """Preferences, as an installed extension has them."""
+    addon = bpy.context.preferences.addons.new()
+    addon.module = PACKAGE
+    yield addon.preferences
+    bpy.context.preferences.addons.remove(addon)
+
+
+def test_preferences_hold_where_there_are_some(kept, tmp_path):
+    kept.model_folder, kept.cache_megabytes, kept.live_seconds = str(tmp_path), 7, 0.5
+    assert preference(bpy.context, "live_seconds") == 0.5
+    assert model_folder(bpy.context) == str(tmp_path)
+    session = session_of(bpy.context)
+    assert session.cache.limit == 7_000_000
+    bpy.context.preferences.addons[PACKAGE].preferences.cache_megabytes = 9
+    assert session.cache.limit == 9_000_000
+
+
+def test_a_team_s_folder_is_in_the_menu(kept, tmp_path):
+    (tmp_path / "horse.json").write_text("{}")
+    kept.model_folder = str(tmp_path)
+    menu = MagicMock()
+    panel_models.WKS_SEGMENT_MT_model_folder.draw(menu, bpy.context)
+    assert menu.layout.operator_context == "EXEC_DEFAULT"
+    assert menu.layout.operator.call_args.kwargs["text"] == "horse"
+    assert menu.layout.operator.return_value.filepath == str(tmp_path / "horse.json")
+    kept.model_folder = ""
+    panel_models.WKS_SEGMENT_MT_model_folder.draw(menu, bpy.context)
+    assert "preferences" in menu.layout.label.call_args.kwargs["text"]
 
 
 def test_without_an_installed_extension_defaults_hold():

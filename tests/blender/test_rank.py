@@ -1,5 +1,7 @@
 """Which model fits: in the window's list, on the command line, and the paper's protocol on a folder."""
 
+from unittest.mock import MagicMock
+
 import bpy
 import numpy as np
 import pytest
@@ -93,6 +95,17 @@ def test_without_a_model_or_a_ranking_the_buttons_are_grey(settings):
     assert not OPS.apply_ranked.poll()
 
 
+def test_an_empty_model_folder_is_told(settings, tmp_path, monkeypatch):
+    from wks_segment.blender.operators import rank as operator
+
+    for module in (ranking, operator):
+        monkeypatch.setattr(module, "model_folder", lambda context: str(tmp_path))
+    select(limbed())
+    assert OPS.rank.poll()
+    with pytest.raises(RuntimeError, match="No model yet: learn one, import one, or set Model Folder"):
+        OPS.rank()
+
+
 def test_models_of_the_folder_take_part_and_are_added_when_applied(two, tmp_path, monkeypatch):
     two.active_model = 0
     OPS.save_model(filepath=str(tmp_path / "folder limbed.json"))
@@ -112,6 +125,19 @@ def test_models_of_the_folder_take_part_and_are_added_when_applied(two, tmp_path
     assert two.ranking[0].path == ""
     assert OPS.apply_ranked() == {"FINISHED"}
     assert len(two.models) == 1
+
+
+def test_panel_shows_the_ranking(two):
+    OPS.rank()
+    panel = MagicMock()
+    panel_models.WKS_SEGMENT_PT_models.ranking(panel, two)
+    column = panel.layout.column.return_value
+    assert column.label.call_args_list[0].kwargs["text"] == "Unseen: Limbed fits, surely"
+    row = column.row.return_value
+    assert [call.kwargs["text"] for call in row.operator.call_args_list] == ["Use", "Use"]
+    shown = [call.kwargs["text"] for call in row.row.return_value.label.call_args_list]
+    assert shown[::2] == ["Limbed", "Box"]
+    assert shown[1].endswith(" %")
 
 
 # Command line

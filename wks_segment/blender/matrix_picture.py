@@ -49,6 +49,7 @@ def render_matrix(retrieval: Retrieval, path: Path) -> None:
         camera.matrix_world = Matrix.Translation((width / 2 - label - MARGIN, label + MARGIN - height / 2, 10.0))
         scene.collection.objects.link(camera)
         scene.camera = camera
+        scene.render.dither_intensity = 0.0  # flat colors, a small file
         render(scene, path, round(CELL * width), round(CELL * height), light="FLAT")
 
 

@@ -16,7 +16,7 @@ class WKS_SEGMENT_MT_object(bpy.types.Menu):
     def draw(self, context: bpy.types.Context) -> None:
         # As by the buttons: a job in a thread, a question before a large one.
         self.layout.operator_context = "INVOKE_DEFAULT"
-        for name in ("learn", "apply", "rank", "clear"):
+        for name in ("learn", "apply", "rank", "apply_ranked", "clear"):
             self.layout.operator(f"wks_segment.{name}")
         self.layout.separator()
         for name in ("bake", "unwrap", "separate", "transfer"):

@@ -38,6 +38,7 @@ class WKS_SEGMENT_MT_model_folder(bpy.types.Menu):
 
     def draw(self, context: bpy.types.Context) -> None:
         found = models.in_folder(model_folder(context))
+        self.layout.operator_context = "EXEC_DEFAULT"  # or it would ask for the file
         for name, path in found.items():
             self.layout.operator("wks_segment.load_model", text=name, translate=False).filepath = str(path)
         if not found:

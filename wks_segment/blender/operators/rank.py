@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bpy
 
-from .. import models
 from ..preferences import model_folder
 from ..ranking import RankWork
 from . import feedback
@@ -20,7 +19,8 @@ class WKS_SEGMENT_OT_rank(RunsJob[RankWork], bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not (context.scene.wks_segment.model or models.in_folder(model_folder(context))):
+        # Not what is in the folder: this is asked whenever the panel is drawn, and the folder may be far away.
+        if not (context.scene.wks_segment.model or model_folder(context)):
             cls.poll_message_set("No model yet: learn one, import one, or set Model Folder in the preferences")
             return False
         return (
