@@ -305,7 +305,7 @@ class RealBlender:
     def over_viewport(self) -> None:
         """Move the mouse to where keys mean the viewport."""
         x, y, width, height = self.ask("region", "WINDOW")
-        self.move(x + width // 3, y + height - 40)
+        self.move(x + width // 2, y + height - 40)  # beside the last operator
 
     def _run_along(self, *command: str) -> None:
         with open(self.shared / f"{command[0]}.log", "wb") as log:
