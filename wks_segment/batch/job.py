@@ -105,9 +105,9 @@ def key_of(path: Path, settings: Sequence[str]) -> str:
 
 
 def content_of(path: Path) -> str:
-    """A name for the content of a file, or of all files of a folder."""
+    """A name for the content of a model's file, or of all models of a folder."""
     digest = hashlib.blake2b(digest_size=12)
-    for each in sorted(path.iterdir()) if path.is_dir() else [path]:
+    for each in sorted(path.glob("*.json")) if path.is_dir() else [path]:
         if each.is_file():
             digest.update(each.name.encode() + b"\0" + each.read_bytes())
     return digest.hexdigest()
