@@ -203,11 +203,7 @@ class PoseSegmentation(PoseDescriber):
             shares, group = np.full(MAX_SAMPLES, 1 / MAX_SAMPLES), group[drawn]
         signature = np.concatenate(signatures)
         samples = self._scaled(signature).astype(np.float64)
-        self.centre_ = shares @ samples
-        self.spread_ = np.maximum(np.sqrt(shares @ (samples - self.centre_) ** 2), model_file.LEAST)
-        if self.preset == "paper":
-            self.spread_ = np.ones_like(self.spread_)
-        samples = (samples - self.centre_) / self.spread_
+        samples = self._centred(samples, shares)
 
         def mixing(share: float) -> None:
             tick("mixture", DESCRIBED + (MIXED - DESCRIBED) * share)
@@ -548,6 +544,15 @@ class PoseSegmentation(PoseDescriber):
     def _scaled(self, signature: FloatArray) -> FloatArray:
         return np.log(signature + SIGNATURE_OFFSET) if self._setting("scaling") == "log" else signature
 
+    @threadpool_limits.wrap(limits=1, user_api="blas")  # the same digits with any number of threads
+    def _centred(self, samples: FloatArray, shares: FloatArray) -> FloatArray:
+        """Learn the centre and the spread of samples; the samples without them."""
+        self.centre_ = shares @ samples
+        self.spread_ = np.maximum(np.sqrt(shares @ (samples - self.centre_) ** 2), model_file.LEAST)
+        if self.preset == "paper":
+            self.spread_ = np.ones_like(self.spread_)
+        return np.asarray((samples - self.centre_) / self.spread_)
+
     def _standardised(self, signature: FloatArray) -> FloatArray:
         scaled = self._scaled(signature)  # a new array, or the signature itself; in its own precision
         return np.asarray((scaled - self.centre_.astype(scaled.dtype)) / self.spread_.astype(scaled.dtype))
@@ -563,6 +568,7 @@ class PoseSegmentation(PoseDescriber):
             densities = densities + np.log(signature + SIGNATURE_OFFSET).sum(axis=1)
         return likely_mean(densities, shares) / self.n_energies
 
+    @threadpool_limits.wrap(limits=1, user_api="blas")  # as above
     def _usual_scores(
         self, samples: FloatArray, signature: FloatArray, shares: FloatArray, group: IntArray
     ) -> FloatArray:
