@@ -67,23 +67,23 @@ class WKS_SEGMENT_PT_models(SubPanel, bpy.types.Panel):
         row.operator("wks_segment.save_model", text="Export", icon="EXPORT")
         layout.prop(settings, "replace_model")
         layout.operator("wks_segment.rank", icon="SORTSIZE")
-        self.ranking(settings)
+        draw_ranking(layout, settings)
 
-    def ranking(self, settings: Any) -> None:
-        """Show which models fit, best first; a button applies one."""
-        if not settings.ranking:
-            return
-        column = self.layout.column(align=True)
-        for line in wrapped(settings.verdict):
-            column.label(text=line)
-        for index, item in enumerate(settings.ranking[:SHOWN]):
-            row = column.row(align=True)
-            name = row.row(align=True)
-            name.label(text=item.name, translate=False)
-            share = row.row(align=True)
-            share.alignment = "RIGHT"
-            share.label(text=f"{100 * item.probability:.0f} %")
-            row.operator("wks_segment.apply_ranked", text="Use", icon="BRUSHES_ALL").index = index
+
+def draw_ranking(layout: Any, settings: Any) -> None:
+    """Show which models fit, best first; a button applies one."""
+    if not settings.ranking:
+        return
+    column = layout.column(align=True)
+    for line in wrapped(settings.verdict):
+        column.label(text=line)
+    for index, item in enumerate(settings.ranking[:SHOWN]):
+        row = column.row(align=True)
+        row.label(text=item.name, translate=False)
+        share = row.row(align=True)
+        share.alignment = "RIGHT"
+        share.label(text=f"{100 * item.probability:.0f} %")
+        row.operator("wks_segment.apply_ranked", text="Use", icon="BRUSHES_ALL").index = index
 
 
 def details(settings: Any) -> list[str]:
