@@ -45,11 +45,7 @@ def take(blender: RealBlender, folder: Path) -> None:
     blender.wait_for("segments", BODY)
     blender.over_viewport()
     viewport(blender, folder / "panel.png")
-    for name, inside in {
-        "outputs": "write_materials",
-        "models": "wks_segment.save_model",
-        "advanced": "snap_to",
-    }.items():
+    for name, inside in SUBPANELS.items():
         blender.find(inside)  # opens its sub-panel
         panel(blender, folder / f"panel_{name}.png")
 
