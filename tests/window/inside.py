@@ -142,8 +142,7 @@ def rows():
         part = faces.layers.int["wks_segment"]
         chosen = [face[part] for face in faces if face.select]
     return [
-        [item.name, item.share, item.hidden, chosen.count(item.number)]
-        for item in _window().scene.wks_segment.segments
+        [item.name, item.share, item.hidden, chosen.count(item.number)] for item in _window().scene.wks_segment.segments
     ]
 
 
