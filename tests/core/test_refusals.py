@@ -10,7 +10,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "refusals.md").read_text(encoding="utf-8").splitlines()
 REFUSALS = {
     "UserError", "TooLargeError", "ChangedError", "ValueError", "TypeError", "PermissionError", "MemoryError",
-    "SpectrumError", "ModelFileError", "BatchError", "ArgumentTypeError", "poll_message_set",
+    "SpectrumError", "ModelFileError", "BatchError", "ArgumentTypeError",
 }  # fmt: skip
 """What is called with a message for the user."""
 
@@ -30,8 +30,10 @@ def messages():
             if not isinstance(call, ast.Call) or not call.args:
                 continue
             name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
-            reported = name == "report" and isinstance(call.args[0], ast.Set) and "INFO" not in ast.dump(call.args[0])
-            parts = literals(call.args[1]) if reported else literals(call.args[0]) if name in REFUSALS else []
+            if name == "explain" or (name == "tell" and "INFO" not in ast.dump(call.args[1])):
+                parts = literals(call.args[-1])  # what an operator tells, and why a button is grey
+            else:
+                parts = literals(call.args[0]) if name in REFUSALS else []
             # What only puts a name before the message of another error says nothing of its own.
             if len(re.findall("[A-Za-z]{2,}", " ".join(parts))) > 1:
                 yield pytest.param(parts, id=f"{path.stem}:{call.lineno}")

@@ -16,6 +16,7 @@ from bpy.app.handlers import persistent
 
 from ..core.description import Progress
 from .errors import ChangedError, EndedError, UserError
+from .messages import in_panel
 
 TICK = 0.1
 """Seconds between two looks at a job."""
@@ -127,16 +128,17 @@ class Job:
     @property
     def epitaph(self) -> str:
         """How it was ended."""
-        how = f"ended, nothing is written: {self._reason}" if self._reason else "cancelled, nothing is written"
-        return f"{self.name} was {how}"
+        if self._reason:
+            return f"{self.name} was ended, nothing is written: {self._reason}"
+        return f"{self.name} was cancelled, nothing is written"
 
     @property
     def lines(self) -> tuple[str, str]:
-        """What it is at, and how far: "Signature of Fox, frame 12 · 3 of 5" and "about 20 s left"."""
+        """What it is at, and how far, for the panel: "Signature of Fox, frame 12 · 3 of 5" and "about 20 s left"."""
         if self.ending:
-            return "Cancelling", self._reason
-        stage = re.sub(r" \((\d+ of \d+)\)$", r" · \1", self.stage.replace('"', ""))
-        return stage, str(self._left) or f"{100 * self.share:.0f} %"
+            return in_panel("Cancelling"), in_panel(self._reason)
+        stage = re.sub(r" \((\d+ \w+ \d+)\)$", r" · \1", in_panel(self.stage).replace('"', ""))
+        return stage, in_panel(str(self._left)) or f"{100 * self.share:.0f} %"
 
     def _progress(self, stage: str, share: float) -> None:
         """Called in the thread."""

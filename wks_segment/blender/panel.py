@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 
 from .jobs import desk_of
+from .messages import in_panel
 from .presets import WKS_SEGMENT_PT_presets
 from .session import session_of
 
@@ -170,8 +171,9 @@ class WKS_SEGMENT_PT_advanced(SubPanel, bpy.types.Panel):
 
 
 def wrapped(text: str) -> list[str]:
-    """Lines that the sidebar has room for; what is a pair of numbers stays together, as "3 of 5" does."""
-    joined = re.sub(r"(?<=\d) (?=\d|of \d)|(?<=\d of) (?=\d)", "\N{NO-BREAK SPACE}", text)
+    """A message in lines that the sidebar has room for; what is a pair of numbers stays together, as "3 of 5" does."""
+    pair = r"(?<=\d) (?=\d|(of|von) \d)|((?<=\d of)|(?<=\d von)) (?=\d)"
+    joined = re.sub(pair, "\N{NO-BREAK SPACE}", in_panel(text))
     return [short for line in joined.splitlines() for short in wrap(line, WIDTH)]
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 
 from . import models
+from .messages import in_panel
 from .panel import SubPanel, wrapped
 from .preferences import model_folder
 
@@ -42,7 +43,7 @@ class WKS_SEGMENT_MT_model_folder(bpy.types.Menu):
         for name, path in found.items():
             self.layout.operator("wks_segment.load_model", text=name, translate=False).filepath = str(path)
         if not found:
-            self.layout.label(text=NO_FOLDER)
+            self.layout.label(text=in_panel(NO_FOLDER))
 
 
 class WKS_SEGMENT_PT_models(SubPanel, bpy.types.Panel):
@@ -63,8 +64,8 @@ class WKS_SEGMENT_PT_models(SubPanel, bpy.types.Panel):
         for line in details(settings):
             column.label(text=line)
         row = layout.row(align=True)
-        row.operator("wks_segment.load_model", text="Import", icon="IMPORT")
-        row.operator("wks_segment.save_model", text="Export", icon="EXPORT")
+        row.operator("wks_segment.load_model", text=in_panel("Import"), icon="IMPORT")
+        row.operator("wks_segment.save_model", text=in_panel("Export"), icon="EXPORT")
         layout.prop(settings, "replace_model")
         layout.operator("wks_segment.rank", icon="SORTSIZE")
         draw_ranking(layout, settings)
@@ -83,7 +84,7 @@ def draw_ranking(layout: Any, settings: Any) -> None:
         share = row.row(align=True)
         share.alignment = "RIGHT"
         share.label(text=f"{100 * item.probability:.0f} %")
-        row.operator("wks_segment.apply_ranked", text="Use", icon="BRUSHES_ALL").index = index
+        row.operator("wks_segment.apply_ranked", text=in_panel("Use"), icon="BRUSHES_ALL").index = index
 
 
 def details(settings: Any) -> list[str]:

@@ -6,7 +6,9 @@ from typing import Any
 
 import bpy
 
+from .messages import in_panel
 from .panel import SubPanel, wrapped
+from .translations import NAME
 
 PRESETS = {
     "Human": (
@@ -68,9 +70,11 @@ class WKS_SEGMENT_MT_names(bpy.types.Menu):
         row = self.layout.row()
         for preset, names in PRESETS.items():
             column = row.column()
-            column.label(text=preset)
+            column.label(text=preset, text_ctxt=NAME)
             for name in names:
-                column.operator("wks_segment.name_segment", text=name).name = name
+                # As with Blender's own objects, the name itself is translated only if the user wants that of new data.
+                given = bpy.app.translations.pgettext_data(name, NAME)
+                column.operator("wks_segment.name_segment", text=name, text_ctxt=NAME).name = given
 
 
 class WKS_SEGMENT_MT_specials(bpy.types.Menu):
@@ -114,14 +118,14 @@ class WKS_SEGMENT_PT_segments(SubPanel, bpy.types.Panel):
         column.menu("WKS_SEGMENT_MT_specials", text="", icon="DOWNARROW_HLT")
         row = layout.row(align=True)
         if context.mode == "EDIT_MESH":
-            row.operator("wks_segment.assign_faces", text="Assign")
-            row.operator("wks_segment.new_segment", text="New")
-            row.operator("wks_segment.forget_faces", text="Forget")
+            row.operator("wks_segment.assign_faces", text=in_panel("Assign"))
+            row.operator("wks_segment.new_segment", text=in_panel("New"))
+            row.operator("wks_segment.forget_faces", text=in_panel("Forget"))
         else:
-            row.menu("WKS_SEGMENT_MT_merge", text="Merge Into")
-            row.operator("wks_segment.split_segment", text="Split")
+            row.menu("WKS_SEGMENT_MT_merge", text=in_panel("Merge Into"))
+            row.operator("wks_segment.split_segment", text=in_panel("Split"))
         if settings.faces_by_hand:
-            layout.label(text=f"{settings.faces_by_hand} faces by hand", icon="HAND")
+            layout.label(text=in_panel(f"{settings.faces_by_hand} faces by hand"), icon="HAND")
 
 
 CLASSES = (

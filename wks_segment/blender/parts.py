@@ -47,7 +47,7 @@ def among(parts: IntArray) -> list[int]:
 
 def counted(n_segments: int, n_parts: int) -> str:
     """How many segments, and how many parts if these are more."""
-    return f"{n_segments} segments" + f" in {n_parts} parts" * (n_parts > n_segments)
+    return f"{n_segments} segments in {n_parts} parts" if n_parts > n_segments else f"{n_segments} segments"
 
 
 def name_of(part: int) -> str:

@@ -55,7 +55,7 @@ class Report:
     def facts(self) -> list[str]:
         """What a person wants to know, short."""
         return [
-            f"{len(self.poses)} pose" + "s" * (len(self.poses) != 1),
+            "1 pose" if len(self.poses) == 1 else f"{len(self.poses)} poses",
             f"{sum(pose.mesh.n_vertices for pose in self.poses):,} vertices",
             parts.counted(self.n_segments, len(self.parts)),
             *([f"better triangles for {improved}"] if (improved := self.laplacians.count("delaunay")) else []),

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+from .messages_de import GERMAN_MESSAGES
+
 OPERATOR = "Operator"
-"""Blender's context of the names of operators; all else is in the default one."""
+"""Blender's context of the names of operators; names and descriptions of all else are in the default one."""
+MESSAGE = "WKS Segment"
+"""Our own context, of what is said while the extension works: `messages` fills it in."""
+
+NAME = "WKS Segment name"
+"""And of what parts of a body are called."""
 
 GERMAN_OPERATORS = {
     "Learn and Segment": "Lernen und segmentieren",
@@ -265,8 +272,40 @@ GERMAN = {
 }
 """Names and descriptions of settings, panels and menus, and the tooltips of operators."""
 
+GERMAN_NAMES = {
+    "Human": "Mensch",
+    "Head": "Kopf",
+    "Hair": "Haare",
+    "Neck": "Hals",
+    "Torso": "Rumpf",
+    "Hips": "Hüfte",
+    "Arm": "Arm",
+    "Upper Arm": "Oberarm",
+    "Forearm": "Unterarm",
+    "Hand": "Hand",
+    "Leg": "Bein",
+    "Thigh": "Oberschenkel",
+    "Shin": "Unterschenkel",
+    "Foot": "Fuß",
+    "Clothes": "Kleidung",
+    "Quadruped": "Vierbeiner",
+    "Muzzle": "Schnauze",
+    "Ear": "Ohr",
+    "Tail": "Schwanz",
+    "Tail Tip": "Schwanzspitze",
+    "Foreleg": "Vorderbein",
+    "Hind Leg": "Hinterbein",
+    "Paw": "Pfote",
+    "Forepaw": "Vorderpfote",
+    "Hind Paw": "Hinterpfote",
+    "Mane": "Mähne",
+}
+"""Names for segments to choose from."""
+
 TRANSLATIONS = {
     "de_DE": {("*", text): german for text, german in GERMAN.items()}
     | {(OPERATOR, text): german for text, german in GERMAN_OPERATORS.items()}
+    | {(MESSAGE, text): german for text, german in (GERMAN_OPERATORS | GERMAN_MESSAGES).items()}
+    | {(NAME, text): german for text, german in GERMAN_NAMES.items()}
 }
 """By language: text by context and English text."""

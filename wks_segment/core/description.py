@@ -159,8 +159,8 @@ class PoseDescriber:
         def report() -> None:
             if progress:
                 current = next((i for i, share in enumerate(done) if share < 1), len(done) - 1)
-                place = f"{current + 1} of {len(done)}"
-                progress(f"pose {place}" if names is None else f"{called[current]} ({place})", sum(done) / len(done))
+                stage = f"{called[current]} ({current + 1} of {len(done)})"
+                progress(f"pose {current + 1} of {len(done)}" if names is None else stage, sum(done) / len(done))
 
         if not len(meshes):
             return []

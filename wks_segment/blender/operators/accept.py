@@ -28,7 +28,7 @@ class WKS_SEGMENT_OT_accept(bpy.types.Operator):
         try:
             work = session_of(context).update(context.scene)
         except UserError as error:
-            self.report({"ERROR"}, str(error))
+            feedback.tell(self, {"ERROR"}, str(error))
             return {"CANCELLED"}
         if work.wanted.colors:
             feedback.show_colors(context)

@@ -21,7 +21,7 @@ class WKS_SEGMENT_OT_apply(RunsWork, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if not context.scene.wks_segment.model:
-            cls.poll_message_set("No model yet: use Learn and Segment, or import a model")
+            feedback.explain(cls, "No model yet: use Learn and Segment, or import a model")
             return False
         return (
             feedback.no_job_runs(cls, context)

@@ -30,7 +30,7 @@ class WKS_SEGMENT_OT_apply_ranked(RunsWork, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if not context.scene.wks_segment.ranking:
-            cls.poll_message_set("No ranking yet: use Rank Models")
+            feedback.explain(cls, "No ranking yet: use Rank Models")
             return False
         return feedback.no_job_runs(cls, context) and feedback.in_object_mode(cls, context)
 

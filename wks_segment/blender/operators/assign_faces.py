@@ -57,7 +57,7 @@ class WKS_SEGMENT_OT_forget_faces(bpy.types.Operator):
         if not feedback.has_segments(cls, context):
             return False
         if not context.scene.wks_segment.faces_by_hand:
-            cls.poll_message_set("No face was assigned by hand")
+            feedback.explain(cls, "No face was assigned by hand")
             return False
         return True
 
@@ -72,7 +72,7 @@ class WKS_SEGMENT_OT_forget_faces(bpy.types.Operator):
                 count += int(forgotten.sum())
                 keep_by_hand(mesh, np.where(forgotten, -1, given))
             segments.rewrite_all(settings, objects)
-        self.report({"INFO"}, f"{count} faces are as the model has them")
+        feedback.tell(self, {"INFO"}, f"{count} faces are as the model has them")
         return {"FINISHED"}
 
 
@@ -92,7 +92,7 @@ def _assign(operator: bpy.types.Operator, context: bpy.types.Context, part: int 
             segments.rewrite_all(settings, objects)
             segments.activate(settings, part)
     if not count:
-        operator.report({"WARNING"}, "Select some faces of an object that has segments first")
+        feedback.tell(operator, {"WARNING"}, "Select some faces of an object that has segments first")
         return {"CANCELLED"}
-    operator.report({"INFO"}, f"{count} faces are of {settings.style().name_of(part)} now")
+    feedback.tell(operator, {"INFO"}, f"{count} faces are of {settings.style().name_of(part)} now")
     return {"FINISHED"}

@@ -36,9 +36,9 @@ class WKS_SEGMENT_OT_bake(bpy.types.Operator):
                     baked = bake_id_maps(context, character, settings.style(), size, margin, unwrap, warnings, progress)
                     images += [f'"{id_map.image.name}"' for id_map in baked]
         except UserError as error:
-            self.report({"ERROR"}, str(error))
+            feedback.tell(self, {"ERROR"}, str(error))
             return {"CANCELLED"}
-        self.report({"INFO"}, f"Baked {', '.join(images)}: {size} × {size} pixels, kept in this file")
+        feedback.tell(self, {"INFO"}, f"Baked {', '.join(images)}: {size} × {size} pixels, kept in this file")
         for warning in warnings:
-            self.report({"WARNING"}, warning)
+            feedback.tell(self, {"WARNING"}, warning)
         return {"FINISHED"}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..jobs import desk_of
+from . import feedback
 
 
 class WKS_SEGMENT_OT_cancel(bpy.types.Operator):
@@ -17,7 +18,7 @@ class WKS_SEGMENT_OT_cancel(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if desk_of(context).job is None:
-            cls.poll_message_set("No job is running")
+            feedback.explain(cls, "No job is running")
             return False
         return True
 

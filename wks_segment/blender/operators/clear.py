@@ -31,7 +31,8 @@ class WKS_SEGMENT_OT_clear(bpy.types.Operator):
         segments.fill(context.scene.wks_segment)
         if not any(has_labels(mesh) for mesh in bpy.data.meshes):
             feedback.hide_colors(context)
-        self.report({"INFO"}, f"Cleared the segments of {cleared} mesh{'es' * (cleared != 1)}")
+        of = "1 mesh" if cleared == 1 else f"{cleared} meshes"
+        feedback.tell(self, {"INFO"}, f"Cleared the segments of {of}")
         if kept:
-            self.report({"WARNING"}, f"{kept} separated objects were worked on since, and stay")
+            feedback.tell(self, {"WARNING"}, f"{kept} separated objects were worked on since, and stay")
         return {"FINISHED"}

@@ -12,14 +12,25 @@ from .. import segments
 from ..characters import mesh_objects, why_no_mesh
 from ..jobs import BUSY, desk_of
 from ..labels import has_labels
+from ..messages import in_panel, in_report, in_tooltip
 from ..report import Report
 from ..session import session_of
 
 LOOK = "VERTEX"
 """Color mode of solid shading that shows the color attribute."""
 
-MODES = {"OBJECT": "Object Mode", "EDIT_MESH": "Edit Mode"}
+MODES = {"OBJECT": "Object Mode", "EDIT_MESH": "Edit Mode", "OBJECT EDIT_MESH": "Object Mode or Edit Mode"}
 """What artists call modes."""
+
+
+def tell(operator: bpy.types.Operator, kind: set[str], text: str) -> None:
+    """Report: in the status bar and the Info editor."""
+    operator.report(kind, in_report(text))
+
+
+def explain(cls: type[bpy.types.Operator], text: str) -> None:
+    """Say in the tooltip of a grey button why it is."""
+    cls.poll_message_set(in_tooltip(text))
 
 
 @contextmanager
@@ -30,7 +41,7 @@ def cursor_progress(context: bpy.types.Context) -> Iterator[Progress]:
     def progress(stage: str, fraction: float) -> None:
         manager.progress_update(round(100 * fraction))
         if workspace is not None:
-            workspace.status_text_set(f"WKS Segment: {stage}")
+            workspace.status_text_set(f"WKS Segment: {in_panel(stage)}")
 
     manager.progress_begin(0, 100)
     try:
@@ -44,10 +55,10 @@ def cursor_progress(context: bpy.types.Context) -> Iterator[Progress]:
 def finish(operator: bpy.types.Operator, verb: str, report: Report) -> set[str]:
     """Report what was done, warnings last so that they stay in the status bar."""
     for note in report.notes:
-        operator.report({"INFO"}, note)
-    operator.report({"INFO"}, f"{verb}: {', '.join(report.facts)}")
+        tell(operator, {"INFO"}, note)
+    tell(operator, {"INFO"}, f"{verb}: {', '.join(report.facts)}")
     for warning in report.warnings:
-        operator.report({"WARNING"}, warning)
+        tell(operator, {"WARNING"}, warning)
     return {"FINISHED"}
 
 
@@ -73,7 +84,7 @@ def has_window(context: bpy.types.Context) -> bool:
 def in_object_mode(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """For `poll`: whether the mode is right; sets the message if not."""
     if context.mode != "OBJECT":
-        cls.poll_message_set("Switch to Object Mode first")
+        explain(cls, "Switch to Object Mode first")
         return False
     return True
 
@@ -81,7 +92,7 @@ def in_object_mode(cls: type[bpy.types.Operator], context: bpy.types.Context) ->
 def has_selected_mesh(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """For `poll`: whether a mesh is selected; sets the message if not."""
     if not mesh_objects(context.selected_objects):
-        cls.poll_message_set(why_no_mesh(context.selected_objects))
+        explain(cls, why_no_mesh(context.selected_objects))
         return False
     return True
 
@@ -89,7 +100,7 @@ def has_selected_mesh(cls: type[bpy.types.Operator], context: bpy.types.Context)
 def has_labelled_mesh(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """For `poll`: whether a selected mesh has segments; sets the message if not."""
     if not any(has_labels(obj.data) for obj in mesh_objects(context.selected_objects)):
-        cls.poll_message_set("Select an object that has segments")
+        explain(cls, "Select an object that has segments")
         return False
     return True
 
@@ -97,7 +108,7 @@ def has_labelled_mesh(cls: type[bpy.types.Operator], context: bpy.types.Context)
 def has_model(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """For `poll`: whether this scene has a model; sets the message if not."""
     if not context.scene.wks_segment.model:
-        cls.poll_message_set("No model yet: use Learn and Segment, or import a model")
+        explain(cls, "No model yet: use Learn and Segment, or import a model")
         return False
     return True
 
@@ -105,7 +116,7 @@ def has_model(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool
 def no_job_runs(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """For `poll`: whether no job is running; sets the message if one is."""
     if desk_of(context).job is not None:
-        cls.poll_message_set(BUSY)
+        explain(cls, BUSY)
         return False
     return True
 
@@ -113,10 +124,10 @@ def no_job_runs(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bo
 def has_segments(cls: type[bpy.types.Operator], context: bpy.types.Context, modes: str = "OBJECT EDIT_MESH") -> bool:
     """For `poll`: whether there is a segment in the list and the mode is one of these; sets the message if not."""
     if context.mode not in modes.split():
-        cls.poll_message_set(f"Switch to {' or '.join(MODES[mode] for mode in modes.split())} first")
+        explain(cls, f"Switch to {MODES[modes]} first")
         return False
     if segments.active_part(context.scene.wks_segment) is None:
-        cls.poll_message_set("No segments yet: use Learn and Segment or Apply to Selected, or refresh the list")
+        explain(cls, "No segments yet: use Learn and Segment or Apply to Selected, or refresh the list")
         return False
     return True
 
@@ -124,6 +135,6 @@ def has_segments(cls: type[bpy.types.Operator], context: bpy.types.Context, mode
 def shows_preview(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """For `poll`: whether segments are shown that are not written; sets the message if not."""
     if session_of(context).proposed is None:
-        cls.poll_message_set("Nothing is shown that could be written: switch Preview on and change a setting")
+        explain(cls, "Nothing is shown that could be written: switch Preview on and change a setting")
         return False
     return True

@@ -10,6 +10,7 @@ from bpy_extras.io_utils import ImportHelper
 
 from ...core import ModelFileError, PoseSegmentation
 from .. import models
+from . import feedback
 
 
 class WKS_SEGMENT_OT_load_model(bpy.types.Operator, ImportHelper):
@@ -27,9 +28,9 @@ class WKS_SEGMENT_OT_load_model(bpy.types.Operator, ImportHelper):
         try:
             model = PoseSegmentation.load(path)
         except (ModelFileError, OSError) as error:
-            self.report({"ERROR"}, f"{path.name} was not loaded: {error}")
+            feedback.tell(self, {"ERROR"}, f"{path.name} was not loaded: {error}")
             return {"CANCELLED"}
         summary = [f"From {path.name}", f"{model.n_segments_} segments"]
         models.add(context.scene.wks_segment, model, path.stem, summary)
-        self.report({"INFO"}, f"Loaded a model of {model.n_segments_} segments from {path.name}")
+        feedback.tell(self, {"INFO"}, f"Loaded a model of {model.n_segments_} segments from {path.name}")
         return {"FINISHED"}

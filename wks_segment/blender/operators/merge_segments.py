@@ -28,7 +28,7 @@ class WKS_SEGMENT_OT_merge_segments(bpy.types.Operator):
         if not feedback.has_segments(cls, context, "OBJECT"):
             return False
         if len(context.scene.wks_segment.segments) < 2:
-            cls.poll_message_set("There is only one segment")
+            feedback.explain(cls, "There is only one segment")
             return False
         return True
 
@@ -42,12 +42,12 @@ class WKS_SEGMENT_OT_merge_segments(bpy.types.Operator):
         settings = context.scene.wks_segment
         part, into = segments.active_part(settings), self.into
         if part is None or into == part or into not in [item.number for item in settings.segments]:
-            self.report({"ERROR"}, "Choose another segment of the list to merge the active one with")
+            feedback.tell(self, {"ERROR"}, "Choose another segment of the list to merge the active one with")
             return {"CANCELLED"}
         notes, style = settings.notes(), settings.style()
         joined = {other: into if old == part else old for other, old in notes.joined.items()}
         settings.keep_notes(replace(notes, joined=joined | {part: into}))
         segments.rewrite_all(settings)
         segments.activate(settings, into)
-        self.report({"INFO"}, f"{style.name_of(part)} is part of {style.name_of(into)} now")
+        feedback.tell(self, {"INFO"}, f"{style.name_of(part)} is part of {style.name_of(into)} now")
         return {"FINISHED"}

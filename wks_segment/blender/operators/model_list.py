@@ -28,7 +28,7 @@ class WKS_SEGMENT_OT_use_model(bpy.types.Operator):
         index = settings.models.find(self.name)
         if index < 0:
             known = ", ".join(row.name for row in settings.models)
-            self.report({"ERROR"}, f'There is no model named "{self.name}" in the list; there are: {known}')
+            feedback.tell(self, {"ERROR"}, f'There is no model named "{self.name}" in the list; there are: {known}')
             return {"CANCELLED"}
         models.use(settings, index)
         return {"FINISHED"}

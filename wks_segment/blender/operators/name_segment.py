@@ -27,5 +27,5 @@ class WKS_SEGMENT_OT_name_segment(bpy.types.Operator):
         part = segments.active_part(settings)
         if part is not None:
             segments.rename(settings, part, self.name)
-            self.report({"INFO"}, f"Named {settings.style().name_of(part)}")
+            feedback.tell(self, {"INFO"}, f"Named {settings.style().name_of(part)}")
         return {"FINISHED"}

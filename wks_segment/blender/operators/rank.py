@@ -21,7 +21,7 @@ class WKS_SEGMENT_OT_rank(RunsJob[RankWork], bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         # Not what is in the folder: this is asked whenever the panel is drawn, and the folder may be far away.
         if not (context.scene.wks_segment.model or model_folder(context)):
-            cls.poll_message_set("No model yet: learn one, import one, or set Model Folder in the preferences")
+            feedback.explain(cls, "No model yet: learn one, import one, or set Model Folder in the preferences")
             return False
         return (
             feedback.no_job_runs(cls, context)
@@ -35,7 +35,7 @@ class WKS_SEGMENT_OT_rank(RunsJob[RankWork], bpy.types.Operator):
 
     def written(self, context: bpy.types.Context) -> set[str]:
         """Show the ranking and report."""
-        self.report({"INFO"}, self.work.write())
+        feedback.tell(self, {"INFO"}, self.work.write())
         for warning in self.work.report.warnings:
-            self.report({"WARNING"}, warning)
+            feedback.tell(self, {"WARNING"}, warning)
         return {"FINISHED"}

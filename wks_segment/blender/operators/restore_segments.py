@@ -25,7 +25,7 @@ class WKS_SEGMENT_OT_restore_segments(bpy.types.Operator):
             return False
         settings = context.scene.wks_segment
         if not (settings.faces_by_hand or settings.notes().joined):
-            cls.poll_message_set("The segments are those of the model")
+            feedback.explain(cls, "The segments are those of the model")
             return False
         return True
 
@@ -35,7 +35,7 @@ class WKS_SEGMENT_OT_restore_segments(bpy.types.Operator):
             keep_by_hand(mesh, np.full(len(mesh.polygons), -1))
         settings.keep_notes(replace(settings.notes(), joined={}))
         segments.rewrite_all(settings)
-        self.report({"INFO"}, "The segments are those of the model")
+        feedback.tell(self, {"INFO"}, "The segments are those of the model")
         return {"FINISHED"}
 
 

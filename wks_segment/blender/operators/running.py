@@ -11,6 +11,7 @@ from ...core.description import Progress
 from .. import tasks
 from ..errors import ChangedError, EndedError, TooLargeError, UserError
 from ..jobs import Job, desk_of, redraw
+from ..messages import in_panel
 from ..poses import Pose
 from ..session import session_of
 from ..settings import WKSSegmentSettings
@@ -77,7 +78,7 @@ class RunsJob(Generic[W]):
         except TooLargeError as error:
             self.confirmed = self.asked = True
             return context.window_manager.invoke_confirm(
-                self, event, title="Large Job", message=str(error), confirm_text="Go On"
+                self, event, title=in_panel("Large Job"), message=in_panel(str(error)), confirm_text=in_panel("Go On")
             )
         except UserError as error:
             return self.refused(error)
@@ -132,7 +133,7 @@ class RunsJob(Generic[W]):
         except (ChangedError, EndedError) as error:
             self.job.end(str(error))
             said = self.job.epitaph
-            self.report({"WARNING"}, said)  # type: ignore[attr-defined]  # an operator's own
+            feedback.tell(self, {"WARNING"}, said)
             return {"CANCELLED"}
         except UserError as error:
             return self.refused(error)
@@ -153,7 +154,7 @@ class RunsJob(Generic[W]):
 
     def refused(self, error: UserError) -> set[str]:
         """Tell why."""
-        self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]  # an operator's own
+        feedback.tell(self, {"ERROR"}, str(error))
         return {"CANCELLED"}
 
 

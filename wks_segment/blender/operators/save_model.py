@@ -10,6 +10,7 @@ from bpy_extras.io_utils import ExportHelper
 
 from .. import tasks
 from ..errors import UserError
+from . import feedback
 
 
 class WKS_SEGMENT_OT_save_model(bpy.types.Operator, ExportHelper):
@@ -24,7 +25,7 @@ class WKS_SEGMENT_OT_save_model(bpy.types.Operator, ExportHelper):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if not context.scene.wks_segment.model:
-            cls.poll_message_set("No model yet: use Learn and Segment, or import a model")
+            feedback.explain(cls, "No model yet: use Learn and Segment, or import a model")
             return False
         return True
 
@@ -36,7 +37,7 @@ class WKS_SEGMENT_OT_save_model(bpy.types.Operator, ExportHelper):
             model.part_notes_ = context.scene.wks_segment.notes()
             model.save(path)
         except (UserError, ValueError, OSError) as error:
-            self.report({"ERROR"}, f"The model was not saved: {error}")
+            feedback.tell(self, {"ERROR"}, f"The model was not saved: {error}")
             return {"CANCELLED"}
-        self.report({"INFO"}, f"Saved the model to {path}")
+        feedback.tell(self, {"INFO"}, f"Saved the model to {path}")
         return {"FINISHED"}

@@ -44,7 +44,7 @@ class WKS_SEGMENT_OT_segments_from(bpy.types.Operator):
                 labels[character] = corrected_labels(character, self.source, found)
                 weights[character] = corrected_weights(character, found)
         except UserError as error:
-            self.report({"ERROR"}, str(error))
+            feedback.tell(self, {"ERROR"}, str(error))
             return {"CANCELLED"}
         soft = weights if self.source == GROUP and settings.vertex_groups == "soft" else None
         # What was drawn last is what is meant, also where faces had a segment by hand.
@@ -55,7 +55,7 @@ class WKS_SEGMENT_OT_segments_from(bpy.types.Operator):
         if settings.write_colors:
             feedback.show_colors(context)
         for warning in report.warnings:
-            self.report({"WARNING"}, warning)
+            feedback.tell(self, {"WARNING"}, warning)
         n_parts = sum(len(set(values.tolist())) for values in labels.values())
-        self.report({"INFO"}, f"{n_parts} segments taken over")
+        feedback.tell(self, {"INFO"}, f"{n_parts} segments taken over")
         return {"FINISHED"}

@@ -35,7 +35,7 @@ class WKS_SEGMENT_OT_select_segment(bpy.types.Operator):
         if context.mode == "EDIT_MESH":
             objects = [obj for obj in objects if obj.mode == "EDIT"]
         if part is None or not objects:
-            self.report({"WARNING"}, "No object with segments is to be seen here")
+            feedback.tell(self, {"WARNING"}, "No object with segments is to be seen here")
             return {"CANCELLED"}
         context.scene.tool_settings.mesh_select_mode = (False, False, True)
         if context.mode == "OBJECT":
@@ -47,7 +47,7 @@ class WKS_SEGMENT_OT_select_segment(bpy.types.Operator):
         if not self.extend:
             bpy.ops.mesh.select_all(action="DESELECT")
         count = sum(_select(mesh, part) for mesh in segments.meshes_of(objects))
-        self.report({"INFO"}, f"{count} faces of {settings.style().name_of(part)}")
+        feedback.tell(self, {"INFO"}, f"{count} faces of {settings.style().name_of(part)}")
         return {"FINISHED"}
 
 

@@ -38,7 +38,7 @@ class WKS_SEGMENT_OT_separate(bpy.types.Operator):
                     if labels is not None:
                         pieces += separate(context, obj, labels, style)
         except UserError as error:
-            self.report({"ERROR"}, str(error))
+            feedback.tell(self, {"ERROR"}, str(error))
             return {"CANCELLED"}
-        self.report({"INFO"}, f"Separated into {len(pieces)} objects")
+        feedback.tell(self, {"INFO"}, f"Separated into {len(pieces)} objects")
         return {"FINISHED"}

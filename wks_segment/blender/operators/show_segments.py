@@ -38,7 +38,7 @@ class _Shows:
                     count += int(hidden.sum())
             segments.fill(settings)
         where = " in Edit Mode, Sculpt Mode and while painting" if count and context.mode == "OBJECT" else ""
-        self.report({"INFO"}, f"{count or 'No'} faces are hidden{where}")  # type: ignore[attr-defined]  # an operator's
+        feedback.tell(self, {"INFO"}, f"{count or 'No'} faces are hidden{where}")
         return {"FINISHED"}
 
 

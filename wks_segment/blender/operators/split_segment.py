@@ -39,10 +39,10 @@ class WKS_SEGMENT_OT_split_segment(bpy.types.Operator):
             if count > MAX_COLOURS:
                 raise UserError(f"{name} is in {count} pieces, too many for a list: raise Smallest Part (Advanced)")
         except UserError as error:
-            self.report({"ERROR"}, str(error))
+            feedback.tell(self, {"ERROR"}, str(error))
             return {"CANCELLED"}
         if count < 2:
-            self.report({"WARNING"}, f"{name} is in one piece on these objects; nothing to split")
+            feedback.tell(self, {"WARNING"}, f"{name} is in one piece on these objects; nothing to split")
             return {"CANCELLED"}
         new = [segments.make_part(settings, parts.base_of(name), part // parts.SIDE) for _ in range(count - 1)]
         number = np.array([-1, *new])
@@ -51,5 +51,5 @@ class WKS_SEGMENT_OT_split_segment(bpy.types.Operator):
                 mine = number[np.maximum(pieces[polygons], 0)]
                 keep_by_hand(obj.data, np.where(mine < 0, by_hand(obj.data), mine))
         segments.rewrite_all(settings, objects)
-        self.report({"INFO"}, f"{name} is in {count} parts now")
+        feedback.tell(self, {"INFO"}, f"{name} is in {count} parts now")
         return {"FINISHED"}

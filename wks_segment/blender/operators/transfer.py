@@ -29,10 +29,10 @@ class WKS_SEGMENT_OT_transfer(bpy.types.Operator):
             return False
         active = context.active_object
         if active is None or active.type != "MESH" or labels_on(active.data) is None:
-            cls.poll_message_set("The active object, the one that was clicked last, has no segments")
+            feedback.explain(cls, "The active object, the one that was clicked last, has no segments")
             return False
         if not set(mesh_objects(context.selected_objects)) - {active}:
-            cls.poll_message_set("Select the objects that are to get segments, and last the one that has them")
+            feedback.explain(cls, "Select the objects that are to get segments, and last the one that has them")
             return False
         return True
 
@@ -49,12 +49,13 @@ class WKS_SEGMENT_OT_transfer(bpy.types.Operator):
                     (target,) = reader.read_objects(context, [character])
                     labels[character] = tasks.filled(transferred(source, target), Body.of(character))
         except UserError as error:
-            self.report({"ERROR"}, str(error))
+            feedback.tell(self, {"ERROR"}, str(error))
             return {"CANCELLED"}
         tasks.write(settings, labels, Wanted.of(settings, labels), report)
         if settings.write_colors:
             feedback.show_colors(context)
         for warning in report.warnings:
-            self.report({"WARNING"}, warning)
-        self.report({"INFO"}, f"Transferred to {len(labels)} object{'s' * (len(labels) != 1)}")
+            feedback.tell(self, {"WARNING"}, warning)
+        targets = "1 object" if len(labels) == 1 else f"{len(labels)} objects"
+        feedback.tell(self, {"INFO"}, f"Transferred to {targets}")
         return {"FINISHED"}

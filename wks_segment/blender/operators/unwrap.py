@@ -38,7 +38,8 @@ class WKS_SEGMENT_OT_unwrap(bpy.types.Operator):
             for mesh, labels in meshes.items():
                 write_uv_map(mesh, unwrap_parts(context, mesh, labels, self.method))
         except UserError as error:
-            self.report({"ERROR"}, str(error))
+            feedback.tell(self, {"ERROR"}, str(error))
             return {"CANCELLED"}
-        self.report({"INFO"}, f"Unwrapped {len(meshes)} mesh{'es' * (len(meshes) != 1)} by segments")
+        unwrapped = "1 mesh" if len(meshes) == 1 else f"{len(meshes)} meshes"
+        feedback.tell(self, {"INFO"}, f"Unwrapped {unwrapped} by segments")
         return {"FINISHED"}

@@ -19,7 +19,7 @@ class WKS_SEGMENT_OT_update(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if not session_of(context).holds(context.scene):
-            cls.poll_message_set(NOTHING)
+            feedback.explain(cls, NOTHING)
             return False
         return feedback.no_job_runs(cls, context) and feedback.in_object_mode(cls, context)
 
@@ -27,6 +27,6 @@ class WKS_SEGMENT_OT_update(bpy.types.Operator):
         try:
             work = session_of(context).update(context.scene)
         except UserError as error:
-            self.report({"ERROR"}, str(error))
+            feedback.tell(self, {"ERROR"}, str(error))
             return {"CANCELLED"}
         return feedback.finish(self, "Updated", work.report)
