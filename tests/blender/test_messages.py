@@ -215,7 +215,7 @@ def test_text_says_the_same(english):
         ("Named No job is running", "Benannt: No job is running"),
         (
             'There is no model named "New" in the list; there are: Use, Split',
-            'In der Liste ist kein Modell namens "New"; da sind: Use, Split',
+            'In der Liste ist kein Modell namens "New"; es gibt: Use, Split',
         ),
         # So does what nobody has translated, such as an error of the system.
         ("The model was not saved: disk full", "Das Modell wurde nicht gespeichert: disk full"),
