@@ -63,6 +63,15 @@ def fitted(obj):
     return PoseSegmentation(n_segments=4, n_eigenpairs=30, n_energies=40).fit([pose.mesh]), pose
 
 
+def faces_around(mesh):
+    """The faces of each vertex."""
+    around = [[] for _ in mesh.vertices]
+    for polygon in mesh.polygons:
+        for vertex in polygon.vertices:
+            around[vertex].append(polygon.index)
+    return around
+
+
 def read(obj):
     return reader.read_objects(bpy.context, [Character((obj,))])[0]
 
@@ -110,7 +119,10 @@ def test_soft_weights_of_a_vertex_sum_to_one(settings):
         assert ((weights > 0.1) & (weights < 0.9)).any(), "all weights are hard"
         columns = [int(name.split()[-1]) - 1 for name in ours(obj)]
         largest = np.array(columns)[weights.argmax(axis=1)]
-        assert (largest == numbers(obj.data, "wks_segment_vertex")).mean() > 0.9
+        # On a border most faces around a vertex can be of another segment than the vertex itself.
+        inside = np.array([len(set(labels_of(obj)[faces])) == 1 for faces in faces_around(obj.data)])
+        assert inside.mean() > 0.5
+        assert (largest == numbers(obj.data, "wks_segment_vertex"))[inside].mean() > 0.95
 
 
 def test_soft_weights_are_the_mean_over_the_poses(settings, rigged):
