@@ -293,8 +293,9 @@ def test_soft_weights_of_a_segment_are_those_of_its_parts(learned, settings):
     for name in beside:
         left, right = two[f"{name}.L"], two[f"{name}.R"]
         assert left.max() > 0.9 < right.max(), name
-        assert (x[left > 0] > 0).all(), name
-        assert (x[right > 0] < 0).all(), name
+        # Where two parts of a segment meet near the middle, a soft weight reaches a vertex across it.
+        assert left[x < 0].sum() < 0.01 * left.sum(), name
+        assert right[x > 0].sum() < 0.01 * right.sum(), name
 
 
 @pytest.mark.parametrize("groups", ["hard", "soft"])
