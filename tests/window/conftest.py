@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -36,18 +37,20 @@ def blender(request):
         pytest.skip("needs root, a Debian mirror and 2 GB for a real Blender: make test-window")
     with RealBlender(request.param, Path(FOLDER)) as blender:
         blender.install_extension(request.getfixturevalue("extension_zip"))
-        blender.make_scene("creature", Path(SCENE).name)
+        blender.make_scene("creature", UNTOUCHED)
         yield blender
 
 
-SCENE = "/window/creature.blend"
+UNTOUCHED, SCENE = "untouched.blend", "creature.blend"
+"""The scene as it was made, and the one that a test opens, and may save."""
 
 
 @pytest.fixture
 def window(blender):
     """Blender's window with the creature before it."""
     blender.clicks = 0
-    blender.start(SCENE)
+    shutil.copyfile(blender.shared / UNTOUCHED, blender.shared / SCENE)
+    blender.start(f"/window/{SCENE}")
     blender.ask("zoom_to_all")
     yield blender
     blender.stop()
