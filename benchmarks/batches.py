@@ -62,6 +62,9 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("demo/batches"))
     parser.add_argument("--runs", default=",".join([*RUNS, "cached"]))
     options = parser.parse_args()
+    runs = options.runs.split(",")
+    if unknown := set(runs) - {*RUNS, "cached"}:
+        parser.error(f"--runs: there is no {', '.join(sorted(unknown))}; there are {', '.join([*RUNS, 'cached'])}")
     shutil.rmtree(options.output, ignore_errors=True)
     options.output.mkdir(parents=True)
     inputs = options.output / "in"
@@ -69,7 +72,7 @@ def main() -> None:
     print("| run | seconds | files a minute | times one process | done | failed | the same models |")
     print("|" + "---|" * 7)
     first = 0.0
-    for name in options.runs.split(","):
+    for name in runs:
         if name == "cached":
             cached(sorted(options.characters.glob("*.glb")), options.output)
             continue

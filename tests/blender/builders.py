@@ -315,3 +315,12 @@ def read_labels(mesh):
     labels = np.empty(len(mesh.polygons), dtype=np.int32)
     mesh.attributes[name].data.foreach_get("value", labels)
     return labels
+
+
+def error_of(operator, **options):
+    """What an operator reports as an error; empty if it worked."""
+    try:
+        operator(**options)
+    except RuntimeError as error:
+        return str(error)
+    return ""

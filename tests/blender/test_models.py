@@ -5,7 +5,7 @@ from unittest.mock import MagicMock
 import bpy
 import numpy as np
 import pytest
-from builders import labels_of, limbed_poses, select
+from builders import error_of, labels_of, limbed_poses, select
 
 from wks_segment.blender import models, panel_models
 from wks_segment.blender.preferences import PACKAGE, WKSSegmentPreferences, model_folder, preference
@@ -14,15 +14,6 @@ from wks_segment.core import PoseSegmentation
 
 pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
-
-
-def error_of(operator, **options):
-    """What it refuses with; empty if it does not."""
-    try:
-        operator(**options)
-    except RuntimeError as error:
-        return str(error)
-    return ""
 
 
 def names(settings):
@@ -204,27 +195,8 @@ def test_all_models_stay_with_the_file(two, tmp_path):
     assert settings.notes().names == {0: "Head"}
 
 
-def test_a_file_of_an_older_version_gets_its_row(poses, settings, tmp_path):
-    OPS.learn()
-    settings.segments[0].name = "Head"
-    model = settings.model
-    settings.models.clear()
-    settings.used_model = -1
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "old.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "old.blend"))
-    settings = bpy.context.scene.wks_segment
-    assert names(settings) == ["Pose 0, Pose 1, Pose 2"]
-    assert (settings.used_model, settings.models[0].n_segments) == (0, 4)
-    assert settings.model == model
-    assert settings.notes().names == {0: "Head"}
-    OPS.learn()
-    assert len(settings.models) == 2, "nothing learned is lost unasked"
-    settings.active_model = 0
-    assert settings.model == model
-
-
 def test_a_model_in_no_row_is_not_lost_either(poses, settings):
-    """As in a scene that was appended from an older file, which no handler hears of."""
+    """As a script leaves it that writes the settings only."""
     OPS.learn()
     model = settings.model
     settings.models.clear()

@@ -8,6 +8,7 @@ import pytest
 from builders import (
     LIMBS,
     changes,
+    error_of,
     labels_of,
     limbed,
     limbed_keys,
@@ -284,15 +285,6 @@ def fails(operator, match, **options):
     with pytest.raises(RuntimeError, match=match):
         operator(**options)
     assert not changes(before, scene_snapshot())
-
-
-def error_of(operator, **options):
-    """What an operator reports as an error; empty if it worked."""
-    try:
-        operator(**options)
-    except RuntimeError as error:
-        return str(error)
-    return ""
 
 
 def test_not_finite_coordinate(learned):

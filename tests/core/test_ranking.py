@@ -9,6 +9,7 @@ from shapes import creature, icosphere
 from wks_segment.core import PoseSegmentation, TriangleMesh, described_alike, rank, retrieve
 from wks_segment.core.explained import left_out_likelihoods, likely_mean
 from wks_segment.core.mixture import fit_mixture
+from wks_segment.core.model_file import ModelFileError
 from wks_segment.core.ranking import least_usual, ranking_of, spread_evenly
 
 QUICK = {"n_segments": 3, "n_eigenpairs": 30, "n_energies": 20}
@@ -90,14 +91,13 @@ def test_one_learned_pose_has_its_own_score():
     assert model.usual_scores_ == pytest.approx([model.comparable_score(mesh)], abs=1e-5)
 
 
-def test_usual_scores_are_in_the_file_and_may_be_missing(models):
+@pytest.mark.parametrize("scores", [None, []])
+def test_usual_scores_are_in_the_file_and_must_be(models, scores):
     text = models[0].to_json()
     np.testing.assert_array_equal(PoseSegmentation.from_json(text).usual_scores_, models[0].usual_scores_)
-    content = json.loads(text)
-    del content["usual_scores"]
-    older = PoseSegmentation.from_json(json.dumps(content))
-    assert older.usual_scores_.size == 0
-    assert ranked([older], stretched(0.45)).best.fits, "nothing is known of what is usual"
+    content = json.loads(text) | {"usual_scores": scores}
+    with pytest.raises(ModelFileError, match="usual_scores"):
+        PoseSegmentation.from_json(json.dumps(content))
 
 
 def test_scores_change_no_label(models):
@@ -129,7 +129,6 @@ def test_what_is_left_out_is_less_likely():
 
 
 def test_far_below_the_usual_is_another_class():
-    assert least_usual(np.array([])) == -np.inf
     assert least_usual(np.array([2.0])) == pytest.approx(1.5)
     assert least_usual(np.array([1.0, 2.0, 3.0])) == pytest.approx(2.0 - 3.0)
     assert ranking_of(np.array([1.0, 1.2]), [np.array([1.0]), np.array([2.0])], "aa").verdict == "nothing fits"
@@ -139,7 +138,6 @@ def test_scores_count_as_they_are_between_models_of_the_same_settings():
     usual = [np.array([1.0]), np.array([2.0])]
     assert ranking_of(np.array([1.1, 1.9]), usual, "aa").best.index == 1
     assert ranking_of(np.array([1.1, 1.9]), usual, "ab").best.index == 0
-    assert ranking_of(np.array([1.1, 1.9]), [np.array([])] * 2, "ab").best.index == 1
 
 
 def test_models_are_described_together_where_they_can_be(models):

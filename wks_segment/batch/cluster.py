@@ -102,7 +102,10 @@ class _Children(WorkerPlugin):
 
     def do(self, job: Job, seconds: float, unfinished: Path) -> Outcome:
         """See `work.do`."""
-        child = Child(python_program(), self._memory, self._ended.is_set) if self._free.empty() else self._free.get()
+        try:
+            child = self._free.get_nowait()  # other threads of the worker take from it, too
+        except queue.Empty:
+            child = Child(python_program(), self._memory, self._ended.is_set)
         try:
             return do(job, child, seconds, unfinished)
         except EndedError:

@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from . import commands, menu, models, operators, panel, panel_models, panel_segments, preferences, presets, session
+from . import commands, menu, operators, panel, panel_models, panel_segments, preferences, presets, session
 from .jobs import HOLDER, Desk
 from .model_item import WKSModelItem, WKSRankItem
 from .segment_item import WKSSegmentItem
@@ -42,7 +42,6 @@ def register() -> None:
     setattr(bpy.types.WindowManager, HOLDER, Desk())
     setattr(bpy.types.WindowManager, session.HOLDER, session.Session())
     bpy.app.translations.register(__name__, TRANSLATIONS)
-    bpy.app.handlers.load_post.append(models.on_load)
     bpy.types.VIEW3D_MT_object.append(menu.draw_in_object_menu)
     _commands.append(bpy.utils.register_cli_command(COMMAND, commands.run))
 
@@ -50,7 +49,6 @@ def register() -> None:
 def unregister() -> None:
     """Called by Blender when the extension is disabled."""
     bpy.utils.unregister_cli_command(_commands.pop())
-    bpy.app.handlers.load_post.remove(models.on_load)
     bpy.types.VIEW3D_MT_object.remove(menu.draw_in_object_menu)
     bpy.app.translations.unregister(__name__)
     for holder in (session.HOLDER, HOLDER):

@@ -231,6 +231,7 @@ GERMAN_MESSAGES = {
     "the model is damaged: the weights do not sum to 1": "das Modell ist beschädigt: die Gewichte ergeben zusammen nicht 1",
     "the model is damaged: … segments of … components": "das Modell ist beschädigt: {1} Segmente aus {2} Komponenten",
     "the model is damaged: … is missing, or has too many numbers": "das Modell ist beschädigt: {1} fehlt oder hat zu viele Zahlen",
+    "the model is damaged: usual_scores is empty": "das Modell ist beschädigt: usual_scores ist leer",
     "the model is damaged: joins has the pair …, …, which cannot be joined": "das Modell ist beschädigt: joins hat das Paar {1}, {2}, das nicht vereint werden kann",
     "the model is damaged: …_groups is …, not a number of groups": "das Modell ist beschädigt: {1}_groups ist {2}, keine Anzahl von Gruppen",
     "the model is damaged: …_segment has a number that is none of … groups": "das Modell ist beschädigt: {1}_segment hat eine Zahl, die zu keiner von {2} Gruppen gehört",

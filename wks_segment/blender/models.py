@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import bpy
-from bpy.app.handlers import persistent
 
 from ..core import ModelFileError, PoseSegmentation
 from .certainty import certainty_lines
@@ -37,7 +36,7 @@ def in_use(settings: WKSSegmentSettings) -> Any | None:
 
 
 def adopt(settings: WKSSegmentSettings) -> None:
-    """List the model that is in use if it is in no row: a file of an older version has it in its settings only."""
+    """List the model that is in use if it is in no row: a script may have put it into the settings only."""
     if not settings.model or in_use(settings) is not None:
         return
     first, *rest = settings.model_summary.splitlines() or [""]
@@ -196,11 +195,3 @@ def _unique(name: str, others: set[str]) -> str:
         number += 1
         found = f"{base} {number}"
     return found
-
-
-@persistent
-def on_load(*_: Any) -> None:
-    """List the models of files of an older version, which had one a scene."""
-    for scene in bpy.data.scenes:
-        if scene.library is None:
-            adopt(scene.wks_segment)

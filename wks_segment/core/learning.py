@@ -56,15 +56,16 @@ class Candidates:
         layout = self.layout
         groupings = [Grouping.of(mean) for mean in layout.contacts]
         if len(layout.grounds) > 1 and layout.samples is None:
-            # What is compared is what it will be: bodies differ more in what is crumbs than poses do.
+            # Compared is what comes out: bodies differ more in what is crumbs than poses do.
             groupings = [self._without_scattered(i, grouping) for i, grouping in enumerate(groupings)]
-        if len(layout.grounds) == 1:
-            losses = [-float(grouping.certainties[self.number(grouping) - 1]) for grouping in groupings]
-        elif layout.samples is None:
             losses = [
                 self._unlike_parts(grouping, layout.grounds, of_faces)
                 for grouping, of_faces in zip(groupings, layout.likeliest, strict=True)
             ]
+            best = int(np.argmin(losses))
+            return layout.mixtures[best], groupings[best]
+        if layout.samples is None:
+            losses = [-float(grouping.certainties[self.number(grouping) - 1]) for grouping in groupings]
         else:
             # What has more to fit must earn it.
             first_type = layout.mixtures[0].covariance_type

@@ -86,8 +86,9 @@ def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], Covariance
                 "handedness": (r, PLANES), "groups": (), "noise": (4,),
             }  # fmt: skip
             grouped |= {f"{kind}_{name}": shape for name, shape in of_regions.items()}
-    content.setdefault("usual_scores", [])  # older programs wrote none
     n_poses = _length(content, "usual_scores", MOST_POSES)
+    if not n_poses:
+        raise ModelFileError("the model is damaged: usual_scores is empty")
     shapes = {"shared": (d,), "diag": (k, d), "spherical": (k,), "tied": (d, d), "full": (k, d, d)}
     if covariance_type not in get_args(CovarianceType):
         raise ModelFileError(f"the model is damaged: unknown covariance type {covariance_type!r}")

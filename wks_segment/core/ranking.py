@@ -133,15 +133,12 @@ def rank(models: Sequence[PoseSegmentation], poses: Sequence[Sequence[PoseSignat
 
 
 def ranking_of(scores: FloatArray, usual: Sequence[FloatArray], settings: Sequence[Hashable]) -> Ranking:
-    """Of models' scores for a shape, those that each usually gives (none: any score fits), and its settings."""
+    """Of models' scores for a shape, those that each usually gives, and its settings."""
     fits = [score >= least_usual(of_model) for score, of_model in zip(scores, usual, strict=True)]
     levels: dict[Hashable, list[float]] = {each: [] for each in settings}
     for each, of_model in zip(settings, usual, strict=True):
-        levels[each] += [float(np.mean(of_model))] if len(of_model) else []
-    known = [level for of_settings in levels.values() for level in of_settings]
-    # Of settings that nothing is known of, what is usual of others is as good as anything.
-    level = np.array([np.mean(levels[each] or known or [0.0]) for each in settings])
-    above = scores - level
+        levels[each].append(float(np.mean(of_model)))
+    above = scores - np.array([np.mean(levels[each]) for each in settings])
     weights = np.exp((above - above.max()) / WIDTH)
     ranks = tuple(
         Rank(int(i), float(above[i]), float(weights[i] / weights.sum()), bool(fits[i]))
@@ -160,9 +157,8 @@ def _settings(model: PoseSegmentation) -> Hashable:
 
 def least_usual(usual: FloatArray) -> float:
     """The score below which a shape is of another class, given those of a model's own poses."""
-    if not len(usual):
-        return -np.inf
-    return float(np.mean(usual) - max(TOLERATED, SPREADS * float(np.std(usual, ddof=1)) if len(usual) > 1 else 0.0))
+    spread = float(np.std(usual, ddof=1)) if len(usual) > 1 else 0.0
+    return float(np.mean(usual)) - max(TOLERATED, SPREADS * spread)
 
 
 def spread_evenly(count: int, n_learned: int) -> list[int]:

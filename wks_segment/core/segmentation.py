@@ -113,7 +113,7 @@ class PoseSegmentation(PoseDescriber):
         Mean and standard deviation of the training signatures over the area.
     usual_scores_ : (poses,) array
         About what `comparable_score` would give for each learned pose, had it not been learned; of one pose alone, what
-        it gives. Empty in a model of an older version.
+        it gives.
     part_notes_ : PartNotes
         Names and colours that a user gave the parts, and which are one: kept with the model, and no more.
     """
