@@ -23,8 +23,9 @@ import bpy
 import wks_segment.blender
 from benchmarks import shapes
 from benchmarks.speed import table_row
-from wks_segment.blender import files, tasks
+from wks_segment.blender import files
 from wks_segment.blender.session import session_of
+from wks_segment.core import PoseSegmentation
 from wks_segment.core.labelling import PosedMesh
 
 CHANGES: list[tuple[str, dict[str, Any]]] = [
@@ -131,7 +132,7 @@ def run(n_poses: int) -> None:
     clock = Clock()
     clock.wrapped(PosedMesh, "mean", "posteriors")
     clock.wrapped(PosedMesh, "labelled", "clean-up")
-    clock.wrapped(tasks, "agreed_sides", "sides")
+    clock.wrapped(PoseSegmentation, "polygon_sides", "sides")
     print(table_row(["change", *COLUMNS]))
     print(table_row(["---"] * (1 + len(COLUMNS))))
     for name, change in CHANGES:

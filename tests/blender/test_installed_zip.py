@@ -189,10 +189,14 @@ def use_extension(site, zip_path, profile):
     assert Path(np.__file__).is_relative_to(site), f"{np.__file__} is not the environment's NumPy"
 
     bpy.ops.wm.read_homefile(use_empty=True)
-    poses = []
-    for turn in (0.0, 0.3, 0.6):
-        bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=32)
-        pose = bpy.context.object
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=32)
+    # Copies of one: Blender numbers the faces of each new sphere in another order.
+    poses = [bpy.context.object]
+    for _ in range(2):
+        poses.append(poses[0].copy())
+        poses[-1].data = poses[0].data.copy()
+        bpy.context.collection.objects.link(poses[-1])
+    for turn, pose in zip((0.0, 0.3, 0.6), poses, strict=True):
         points = np.empty((len(pose.data.vertices), 3), dtype=np.float32)
         pose.data.vertices.foreach_get("co", points.ravel())
         angles = np.arctan2(points[:, 1], points[:, 0])
@@ -201,8 +205,6 @@ def use_extension(site, zip_path, profile):
         points[:, 2] += turn * np.maximum(points[:, 0], 0) ** 2  # one of them rises
         pose.data.vertices.foreach_set("co", points.ravel())
         pose.data.update()
-        poses.append(pose)
-    for pose in poses:
         pose.select_set(True)
 
     settings = bpy.context.scene.wks_segment

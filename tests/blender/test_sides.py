@@ -7,7 +7,7 @@ from builders import changes, coordinates, labels_of, limbed, numbers, read_labe
 from mathutils import Matrix
 
 from wks_segment.blender import creature as builder
-from wks_segment.blender import demo, parts, tasks
+from wks_segment.blender import demo, parts
 from wks_segment.blender.characters import Character
 from wks_segment.blender.labels import clear_labels, write_labels
 from wks_segment.blender.palette import sided_palette
@@ -157,18 +157,6 @@ def test_what_a_modifier_hides_has_the_side_of_what_is_next_to_it(creature):
     assert hidden.sum() > 40
     assert set(sides[hidden & left]) == {1}
     assert set(sides[hidden & ~left]) == {2}
-
-
-def test_poses_vote_on_the_sides_of_their_mesh():
-    class Model:
-        given = iter([[1, 1, 1, 0, -1, 1], [1, 1, 0, 0, 1, 1], [1, -1, 0, 0, -1, 0], [1, 1, 0, 0, -1, 0]])
-
-        def polygon_sides(self, described, polygon_of, labels):
-            return np.array(next(self.given))
-
-    pose = type("Pose", (), {"polygon_of": np.arange(6), "name": "A pose"})
-    found = tasks.agreed_sides(Model(), [pose] * 4, [None] * 4, np.zeros(6, int), lambda stage, share: None)
-    assert found.tolist() == [1, 1, 0, 0, -1, 0]
 
 
 def test_report_counts_segments_and_parts(creature, settings, printed):

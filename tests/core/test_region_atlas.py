@@ -76,11 +76,51 @@ def test_polygons_of_parts_on_both_sides_have_a_side(model):
     mesh = figure(0.3, 0.1)
     polygon_of = np.arange(mesh.n_faces)
     labels = model.segment_polygons([mesh], [polygon_of])
-    side = model.polygon_sides(mesh, polygon_of, labels)
+    side = model.polygon_sides([mesh], [polygon_of], labels)
     for one in ("arm", "leg"):
         assert (side[limb(f"left {one}")] == 1).all()
         assert (side[limb(f"right {one}")] == -1).all()
     assert (side[limb("head")] == 0).all()
+
+
+def test_poses_vote_on_the_sides_of_their_mesh(model, monkeypatch):
+    mesh = figure(subdivisions=3)
+    given = {0.0: [1, 1, 1, 0, -1, 1], 0.1: [1, 1, 0, 0, 1, 1], 0.2: [1, -1, 0, 0, -1, 0], 0.3: [1, 1, 0, 0, -1, 0]}
+    poses = [TriangleMesh(mesh.vertices + (0, 0, height), mesh.faces) for height in given]
+    votes = iter(given.values())
+    monkeypatch.setattr(model, "_sides_seen_in", lambda *arguments: np.array(next(votes)))
+    found = model.polygon_sides(poses, [np.arange(mesh.n_faces) % 6] * 4, np.zeros(6, int))
+    assert found.tolist() == [1, 1, 0, 0, -1, 0]
+
+
+def test_of_many_poses_some_say_what_is_left_and_right(model):
+    poses = [figure(0.3, 0.1 * i, 3) for i in range(8)]
+    polygons = [np.arange(poses[0].n_faces)] * 8
+    labels, seen = model.segment_polygons(poses, polygons), []
+    side = model.polygon_sides(poses, polygons, labels, seen.append)
+    assert seen == [0.2, 0.4, 0.6, 0.8, 1.0]
+    for one in ("arm", "leg"):
+        assert (side[limb(f"left {one}", 3)] == 1).all()
+        assert (side[limb(f"right {one}", 3)] == -1).all()
+
+
+def test_poses_in_other_triangles_say_together_what_is_left_and_right(model):
+    """As a polygon may be cut along another diagonal in each pose."""
+    poses = [figure(0.3, 0.1), figure(0.0, 0.3)]
+    order = np.random.default_rng(0).permutation(poses[1].n_faces)
+    poses[1] = TriangleMesh(poses[1].vertices, poses[1].faces[order])
+    polygons = [np.arange(len(order)), order]
+    labels = model.segment_polygons(poses, polygons)
+    side = model.polygon_sides(poses, polygons, labels)
+    for one in ("arm", "leg"):
+        assert (side[limb(f"left {one}")] == 1).all()
+        assert (side[limb(f"right {one}")] == -1).all()
+
+
+def test_polygons_must_fit_the_poses(model):
+    mesh = figure(subdivisions=3)
+    with pytest.raises(ValueError, match="there are 1 poses, but polygons for 0"):
+        model.polygon_sides([mesh], [], np.zeros(6, int))
 
 
 def test_a_part_in_the_middle_has_no_side_however_the_sides_are_bent(model):
@@ -89,7 +129,7 @@ def test_a_part_in_the_middle_has_no_side_however_the_sides_are_bent(model):
         mesh = figure(left, right)
         ends = {"left leg": limb("left leg"), "right leg": limb("right leg"), "tail": limb("tail", radius=0.22)}
         labels = np.any(list(ends.values()), axis=0).astype(int)
-        side = model.polygon_sides(mesh, np.arange(mesh.n_faces), labels)
+        side = model.polygon_sides([mesh], [np.arange(mesh.n_faces)], labels)
         found = {one: np.unique(side[faces]).tolist() for one, faces in ends.items()}
         assert found == {"left leg": [1], "right leg": [-1], "tail": [0]}
 

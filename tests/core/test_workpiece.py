@@ -27,7 +27,8 @@ def outcome(model, poses):
     labels = model.segment_polygons(poses, POLYGONS, 0.01)
     return [
         labels,
-        *(model.polygon_sides(pose, POLYGONS[0], labels) for pose in poses),
+        model.polygon_sides(poses, POLYGONS, labels),
+        *(model.polygon_sides([pose], POLYGONS[:1], labels) for pose in poses),
         *(model.predict_soft(pose) for pose in poses),
         model.segment_regions(poses[0]),
         model.segment_faces(poses[1]),
@@ -105,8 +106,8 @@ def test_sides_are_told_with_the_regions_that_were_learned(model, described):
     few, faces = model.with_segments(4), np.arange(POSES[0].n_faces)
     for pose in described:
         labels = few.segment_polygons([pose], [faces])
-        side = few.polygon_sides(pose, faces, labels)
-        np.testing.assert_array_equal(side, model.polygon_sides(pose, faces, labels))
+        side = few.polygon_sides([pose], [faces], labels)
+        np.testing.assert_array_equal(side, model.polygon_sides([pose], [faces], labels))
         assert {-1, 1} <= set(side)
 
 

@@ -39,9 +39,6 @@ from .settings import WKSSegmentSettings
 from .style import Style
 from .weights import by_parts, soft_weights
 
-VOTERS = 5
-"""Poses of a mesh that say which of its parts are left and right; more would not say it more surely."""
-
 
 @dataclass(frozen=True)
 class Wanted:
@@ -204,11 +201,14 @@ def label(
                 marked=body.marked,
             )
             if wanted.sides == "two":
-                voters = [mine[i] for i in reader.evenly(0, len(mine) - 1, VOTERS)]
-                sides = agreed_sides(
-                    model, [poses[i] for i in voters], [described[i] for i in voters], found,
-                    lambda stage, share, number=number: progress(stage, (number + share) / len(together)),
-                )  # fmt: skip
+                sides = model.polygon_sides(
+                    [described[i] for i in mine],
+                    [poses[i].polygon_of for i in mine],
+                    found,
+                    lambda share, number=number, name=character.name: progress(
+                        f'Left and right of "{name}"', (number + share) / len(together)
+                    ),
+                )
                 found = parts.numbered(found, sides)
             found = filled(found, body)
             labels |= {poses[i].character: found for i in mine}
@@ -220,19 +220,6 @@ def label(
             else "No segment has parts on both sides: does X point to the character's left when it is at rest?"
         )
     return labels
-
-
-def agreed_sides(
-    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[Workpiece], segments: IntArray,
-    progress: Progress,
-) -> IntArray:  # fmt: skip
-    """(p,) side that most poses of a mesh give to each polygon: 1 left, −1 right, 0 neither; given the segments."""
-    given = []
-    for pose, of_pose in zip(poses, described, strict=True):
-        progress(f'Left and right of "{pose.name}"', 1.0)
-        given.append(model.polygon_sides(of_pose, pose.polygon_of, segments))
-    # Half left and half neither is neither.
-    return np.trunc(np.median(given, axis=0)).astype(np.int64)
 
 
 def soften(

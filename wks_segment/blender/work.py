@@ -118,15 +118,15 @@ class Work:
         first.watch.glance()
         report = Report(first.poses, first.report.laplacians)
         model = copy(first.model)
+        model.smoothness = settings.smoothness
         if number != first.number:
             # Without sides nobody asks for regions, and those that were learned will do.
             poses = first.described if first.learns and settings.sides == "two" else []
             try:
                 with report.stage("regroup"):
-                    model = first.model.with_segments(number, poses, first.poses[0].upright)
+                    model = model.with_segments(number, poses, first.poses[0].upright)
             except ValueError as error:
                 raise UserError(f"This number of segments takes a new Learn and Segment: {error}") from error
-        model.smoothness = settings.smoothness
         with report.stage("read"):
             wanted = Wanted.of(settings, [pose.character for pose in first.poses])
         return replace(first, model=model, wanted=wanted, report=report, first=first, labels={}, _soft=None)

@@ -22,9 +22,8 @@ from scipy.spatial.distance import cdist
 from .laplacian import unit_area_masses
 from .mesh import FloatArray, IntArray, TriangleMesh
 from .regions import FaceAdjacency, connected_regions
-from .shape import outward
-from .smoothing import Flows
 from .surface import Surface
+from .workpiece import Workpiece
 
 FIELDS = 6
 """Functions of the signature that regions are told apart by."""
@@ -52,6 +51,8 @@ BENT = 0.1
 """The same where no mirroring brings the regions close to each other."""
 SIDE_REACH = 0.15
 """What `REACH` is, where a part's side is that of what is near to it."""
+VOTERS = 5
+"""Poses of a mesh that say which of its parts are left and right; more would not say it more surely."""
 SURE = 0.5
 """A part is left or right from this mean of `side_field` on: heat from one side is three times that from the other."""
 
@@ -81,10 +82,10 @@ class Regions:
         order = np.append(np.sort(largest), np.setdiff1d(np.arange(len(segment_of)), largest))
         return cls(np.argsort(order)[region], segment_of[np.sort(largest)])
 
-    def traits(self, surface: Surface, fields: FloatArray, flows: Flows) -> Traits:
+    def traits(self, pose: Workpiece, fields: FloatArray) -> Traits:
         """What tells the r largest apart in a pose, given the (n', FIELDS) fields on its surface."""
         large = np.where(self.region < len(self.segment), self.region, -1)
-        return Traits.of(surface, fields, large, self.segment, flows)
+        return Traits.of(pose, fields, large, self.segment)
 
     def centres(self, mesh: TriangleMesh) -> FloatArray:
         """(r, 3) centre of each of the r largest in units of the square root of the area; x from the middle."""
@@ -128,35 +129,33 @@ class Traits:
     distance: FloatArray
 
     @classmethod
-    def of(cls, surface: Surface, fields: FloatArray, region: IntArray, segment: IntArray, flows: Flows) -> Traits:
+    def of(cls, pose: Workpiece, fields: FloatArray, region: IntArray, segment: IntArray) -> Traits:
         """Describe regions of one pose.
 
         Parameters
         ----------
-        surface : Surface
-            With n' vertices and m original faces.
+        pose : Workpiece
+            With n' vertices on its surface and m original faces.
         fields : (n', FIELDS) array
             Functions of the signature.
         region : (m,) int array
             Region of each face, numbered 0, 1, …, r − 1; -1 for one of none.
         segment : (r,) int array
             Segment of each region.
-        flows : Flows
-            Of the surface.
         """
-        mesh, original = surface.mesh, surface.original
+        surface, mesh, original = pose.surface, pose.surface.mesh, pose.surface.original
         count = len(segment)
         area = np.bincount(region[region >= 0], original.face_areas[region >= 0], count) / original.area
         masses = unit_area_masses(mesh)
         inside = _at_vertices(surface, region, count)
-        heat = flows.over(REACH).smooth(inside).astype(np.float64)
+        heat = pose.flows.over(REACH).smooth(inside).astype(np.float64)
         weighed = inside * masses[:, None]
         signature = weighed.T @ fields / np.maximum(weighed.sum(axis=0), LEAST_OVERLAP)[:, None]
         against = np.where(segment[:, None] == segment, -1.0, 0.0)
         np.fill_diagonal(against, 0)
         against /= np.maximum(-against.sum(axis=0), 1)
         np.fill_diagonal(against, (against != 0).any(axis=0))
-        handedness = (heat @ against)[mesh.faces].mean(axis=1).T @ _signed_areas(mesh, fields)
+        handedness = (heat @ against)[mesh.faces].mean(axis=1).T @ _signed_areas(pose, fields)
         overlap = heat.T @ (heat * masses[:, None]) / masses.sum()
         size = np.sqrt(np.maximum(area, LEAST_OVERLAP))
         distance = -REACH * np.log(np.maximum(overlap / np.outer(size, size), LEAST_OVERLAP))
@@ -201,6 +200,10 @@ class RegionAtlas:
                 noise = np.maximum(_spread(mean, poses, names), _scaled(LEAST_NOISE, mean))
             atlas = cls(n_groups, mean, side, noise)
         return replace(atlas, side=sides(centres, poses[0].segment, atlas.mirrored()))
+
+    def sides_of(self, names: IntArray) -> IntArray:
+        """Side of each region that was learned, by its number; 0 of others."""
+        return np.where(names < len(self.side), self.side[np.minimum(names, len(self.side) - 1)], 0)
 
     def mirrored(self) -> IntArray:
         """(r,) which region each is in the mirror image of the character; on from r for one that has none there."""
@@ -313,15 +316,15 @@ def _told_apart(x: FloatArray, opposite: IntArray, least: float = MIDDLE) -> Int
     return np.where((opposite[opposite] == np.arange(len(x))) & (np.abs(apart) > least), np.sign(apart), 0).astype(int)
 
 
-def side_field(surface: Surface, region: IntArray, side: IntArray, flows: Flows) -> FloatArray:
-    """(m,) 1 on the left to −1 on the right, by what is near; given each face's region and the side of each region.
+def side_field(pose: Workpiece, side: IntArray) -> FloatArray:
+    """(m,) 1 on the left to −1 on the right, by what is near; given the side of each face's region: 1, −1 or 0.
 
     The share of heat from the left less that from the right, so that what is far from both, as a tail, is as clearly
     in the middle as what lies between them.
     """
-    inside = _at_vertices(surface, region, len(side)) @ np.stack([side > 0, side < 0], axis=1).astype(np.float64)
-    left, right = np.maximum(flows.over(SIDE_REACH).smooth(inside), 0).T
-    return surface.to_faces(((left - right) / np.maximum(left + right, LEAST_OVERLAP))[:, None])[:, 0]
+    inside = _at_vertices(pose.surface, side % 3, 3)[:, 1:]
+    left, right = np.maximum(pose.flows.over(SIDE_REACH).smooth(inside), 0).T
+    return pose.surface.to_faces(((left - right) / np.maximum(left + right, LEAST_OVERLAP))[:, None])[:, 0]
 
 
 def sides_of_parts(
@@ -371,6 +374,11 @@ def sides_of_parts(
         if len(ground) and len(crumbs):
             side[of_faces[crumbs]] = side[of_faces[ground[cKDTree(centres[ground]).query(centres[crumbs])[1]]]]
     return np.asarray(side[part])
+
+
+def mean_traits(poses: Sequence[Traits]) -> Traits:
+    """Means over poses that have the same regions in the same order."""
+    return _mean(poses[0], poses, [np.arange(len(poses[0].segment))] * len(poses))
 
 
 def _mean(first: Traits, poses: Sequence[Traits], names: Sequence[IntArray]) -> Traits:
@@ -448,10 +456,9 @@ def _at_vertices(surface: Surface, region: IntArray, count: int) -> FloatArray:
     return inside / np.maximum(inside.sum(axis=1, keepdims=True), np.finfo(float).tiny)
 
 
-def _signed_areas(mesh: TriangleMesh, fields: FloatArray) -> FloatArray:
+def _signed_areas(pose: Workpiece, fields: FloatArray) -> FloatArray:
     """(m', PLANES) signed area that each face covers in the plane of each pair of (n', FIELDS) fields."""
-    corners = fields[mesh.faces].astype(np.float64)
+    corners = fields[pose.surface.mesh.faces].astype(np.float64)
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     f, g = np.triu_indices(FIELDS, 1)
-    turned = outward(mesh.faces, mesh.vertices[mesh.faces])
-    return np.asarray((u[:, f] * v[:, g] - u[:, g] * v[:, f]) / 2 * turned[:, None])
+    return np.asarray((u[:, f] * v[:, g] - u[:, g] * v[:, f]) / 2 * pose.turned[:, None])

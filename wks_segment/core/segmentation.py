@@ -29,7 +29,7 @@ from .mesh import FloatArray, IntArray, TriangleMesh
 from .mixture import CovarianceType, GaussianMixture, drawn_evenly, fit_mixtures
 from .part_notes import PartNotes
 from .pose_signature import PoseSignature
-from .region_atlas import FIELDS, RegionAtlas, Regions, Traits, side_field, sides_of_parts
+from .region_atlas import FIELDS, VOTERS, RegionAtlas, Regions, Traits, mean_traits, side_field, sides_of_parts
 from .regions import FaceAdjacency, connected_regions
 from .spectrum import Accuracy
 from .surface import Pieces
@@ -333,27 +333,22 @@ class PoseSegmentation(PoseDescriber):
         ValueError
             If there is no pose, or the lengths do not fit.
         """
-        self._fitted()
-        works = [self._work(pose) for pose in poses]
-        if not works or len(works) != len(polygons):
-            raise ValueError(f"there are {len(works)} poses, but polygons for {len(polygons)}")
-        for i, (work, polygon_of) in enumerate(zip(works, polygons, strict=True)):
-            if np.shape(polygon_of) != (work.surface.original.n_faces,):
-                raise ValueError(
-                    f"pose {i} has {work.surface.original.n_faces} triangles, but polygons for {np.shape(polygon_of)}"
-                )
-        return self._clean(works, polygons, min_share, progress, marked)[0]
+        return self._clean(self._posed(poses, polygons), polygons, min_share, progress, marked)[0]
 
     @threadpool_limits.wrap(limits=1, user_api="blas")  # as above
-    def polygon_sides(self, pose: AnyPose, polygon_of: IntArray, labels: IntArray) -> IntArray:
+    def polygon_sides(
+        self,
+        poses: Sequence[AnyPose],
+        polygons: Sequence[IntArray],
+        labels: IntArray,
+        progress: Callable[[float], None] | None = None,
+    ) -> IntArray:
         """Tell left from right where a segment lies on both sides.
 
         Parameters
         ----------
-        pose
-            As `segment_polygons` had it, or any one of its poses.
-        polygon_of : (m,) int array
-            The polygon of each triangle, -1 for none.
+        poses, polygons, progress
+            As for `segment_polygons`. A few of the poses vote.
         labels : (p,) int array
             What `segment_polygons` gave.
 
@@ -361,21 +356,28 @@ class PoseSegmentation(PoseDescriber):
         -------
         (p,) int array: 1 for polygons of a part on the left that has one opposite, -1 for those on the right, 0 for
         others. All 0 with the paper's setting.
+
+        Raises
+        ------
+        ValueError
+            As by `segment_polygons`.
         """
-        self._fitted()
-        work, atlas = self._work(pose), self.sides_
+        works, atlas = self._posed(poses, polygons), self.sides_
         if atlas is None:
             return np.zeros(len(labels), dtype=np.int64)
-
-        def field() -> FloatArray:
-            region = self._named_regions(atlas, work, None)
-            known = np.zeros(int(region.max()) + 1, dtype=np.int64)
-            known[: len(atlas.side)] = atlas.side[: len(known)]
-            return side_field(work.surface, region, known, work.flows)
-
-        of_faces = work.memo.get("sides", (self.mixture_, self.grouping_, atlas, self._length()), field)
-        neighbours = work.memo.get("polygons", (polygon_of,), lambda: work.neighbours.between_polygons(polygon_of))
-        return sides_of_parts(work.surface, of_faces, polygon_of, labels, MIN_SHARE, neighbours)
+        voters = sorted(set(np.linspace(0, len(works) - 1, VOTERS).round().astype(int).tolist()))
+        given: list[IntArray] = []
+        for alike in _together([works[i] for i in voters]):
+            regions = self._regions(atlas.n_groups, alike)
+            names = atlas.named(mean_traits([self._traits(regions, work) for work in alike]))
+            of_faces = atlas.sides_of(regions.numbered(names, len(atlas.side)))
+            for work in alike:
+                polygon_of = polygons[voters[len(given)]]
+                given.append(self._sides_seen_in(work, of_faces, regions, polygon_of, labels))
+                if progress:
+                    progress(len(given) / len(voters))
+        # Half left and half neither is neither.
+        return np.trunc(np.median(given, axis=0)).astype(np.int64)
 
     def with_segments(
         self,
@@ -481,6 +483,19 @@ class PoseSegmentation(PoseDescriber):
             model.regions_, model.sides_ = (RegionAtlas.of_arrays(arrays, kind) for kind in model_file.KINDS)
         model.mixture_ = GaussianMixture(covariance_type, arrays["weights"], arrays["means"], arrays["covariances"])
         return model
+
+    def _posed(self, poses: Sequence[AnyPose], polygons: Sequence[IntArray]) -> list[Workpiece]:
+        """Poses of one mesh; ValueError if there are none, or polygons do not fit."""
+        self._fitted()
+        works = [self._work(pose) for pose in poses]
+        if not works or len(works) != len(polygons):
+            raise ValueError(f"there are {len(works)} poses, but polygons for {len(polygons)}")
+        for i, (work, polygon_of) in enumerate(zip(works, polygons, strict=True)):
+            if np.shape(polygon_of) != (work.surface.original.n_faces,):
+                raise ValueError(
+                    f"pose {i} has {work.surface.original.n_faces} triangles, but polygons for {np.shape(polygon_of)}"
+                )
+        return works
 
     def _check_parameters(self) -> None:
         least_of = {"n_segments": 1, "n_eigenpairs": 3, "n_energies": 2, "random_state": 0}
@@ -696,27 +711,61 @@ class PoseSegmentation(PoseDescriber):
         first = works[0].surface.original
         if rest is not None and not np.array_equal(rest.faces, first.faces):
             raise ValueError("rest has other faces than the first pose: pass the same mesh, in its rest position")
-        together = [works] if of_one_mesh([work.pose for work in works]) else [[work] for work in works]
         found: list[Regions] = []
         traits: list[Traits] = []
-        for alike in together:
+        for alike in _together(works):
 
             def cleaning(share: float, begun: int = len(traits), count: int = len(alike)) -> None:
                 tick((begun + CLEANED * share * count) / len(works))
 
-            labels, neighbours = self._clean(alike, None, None, cleaning, n_groups=n_groups)
-            regions = Regions.of(labels, neighbours, alike[0].surface.original)
+            regions = self._regions(n_groups, alike, None, cleaning)
             found.append(regions)
             begun = len(traits)
             for i, work in enumerate(alike):
                 tick((begun + CLEANED * len(alike) + (1 - CLEANED) * i) / len(works))
-                traits.append(regions.traits(work.surface, self._fields(work.pose), work.flows))
+                traits.append(self._traits(regions, work))
         centres = found[0].centres(first if rest is None else rest)
         return RegionAtlas.learned(n_groups, traits, centres, alike=len(found) == 1)
 
+    def _sides_seen_in(
+        self, work: Workpiece, side: IntArray, regions: Regions, polygon_of: IntArray, labels: IntArray
+    ) -> IntArray:
+        """(p,) what `polygon_sides` gives, from one pose, given the side of each face's region."""
+        assert self.sides_ is not None
+        field = work.memo.get("sides", (regions, self.sides_), lambda: side_field(work, side))
+        neighbours = work.memo.get("polygons", (polygon_of,), lambda: work.neighbours.between_polygons(polygon_of))
+        return sides_of_parts(work.surface, field, polygon_of, labels, MIN_SHARE, neighbours)
+
+    @threadpool_limits.wrap(limits=1, user_api="blas")  # as above
+    def _regions(
+        self,
+        n_groups: int,
+        works: Sequence[Workpiece],
+        min_share: float | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> Regions:
+        """Connected regions of so many groups on a mesh, agreed on by poses of it."""
+
+        def found() -> Regions:
+            labels, neighbours = self._clean(works, None, min_share, progress, n_groups=n_groups)
+            return Regions.of(labels, neighbours, works[0].surface.original)
+
+        poses = (work.pose for work in works)
+        made_from = self.mixture_, self.grouping_, n_groups, self._length(), self._least_share(min_share), *poses
+        return works[0].memo.get("regions", made_from, found)
+
+    @threadpool_limits.wrap(limits=1, user_api="blas")  # as above
+    def _traits(self, regions: Regions, work: Workpiece) -> Traits:
+        """What tells regions apart in a pose."""
+        fields = work.memo.get("fields", (self.mixture_, self.centre_), lambda: self._fields(work.pose))
+        return work.memo.get("traits", (regions, fields), lambda: regions.traits(work, fields))
+
     def _named_regions(self, atlas: RegionAtlas, work: Workpiece, min_share: float | None) -> IntArray:
         """(m,) region of each face, numbered as in the atlas, and on from there."""
-        labels, neighbours = self._clean([work], None, min_share, n_groups=atlas.n_groups)
-        regions = Regions.of(labels, neighbours, work.surface.original)
-        names = atlas.named(regions.traits(work.surface, self._fields(work.pose), work.flows))
-        return regions.numbered(names, len(atlas.side))
+        regions = self._regions(atlas.n_groups, [work], min_share)
+        return regions.numbered(atlas.named(self._traits(regions, work)), len(atlas.side))
+
+
+def _together(works: Sequence[Workpiece]) -> list[Sequence[Workpiece]]:
+    """The poses whose regions are the same ones: all that have the same faces, or each alone."""
+    return [works] if of_one_mesh([work.pose for work in works]) else [[work] for work in works]

@@ -12,6 +12,7 @@ from .cut import coarse_curvature
 from .mesh import FloatArray
 from .pose_signature import PoseSignature
 from .regions import FaceAdjacency
+from .shape import outward
 from .smoothing import Flows
 from .surface import Surface
 
@@ -73,6 +74,12 @@ class Workpiece:
         """Of the original faces, for a surface of area 1."""
         original = self.surface.original
         return FaceAdjacency.of(self.surface.welded_faces, original.vertices / np.sqrt(original.area))
+
+    @cached_property
+    def turned(self) -> FloatArray:
+        """(m',) 1 for each face of the surface that turns counter-clockwise seen from outside, −1 for others."""
+        mesh = self.surface.mesh
+        return outward(mesh.faces, mesh.vertices[mesh.faces])
 
     @cached_property
     def curvature(self) -> FloatArray:
