@@ -48,6 +48,19 @@ def test_crumbs_join_the_neighbour_with_the_longest_border():
     np.testing.assert_array_equal(cleaned[~crumb], labels[~crumb])
 
 
+def test_a_band_between_two_parts_that_is_small_for_its_label_joins_one_of_them():
+    mesh = grid(40, 10)
+    x = centres_of(mesh)[:, 0]
+    labels = np.where(x < 0.4, 0, np.where(x < 0.45, 2, np.where(x < 0.65, 1, 2)))
+    band = (labels == 2) & (x < 0.5)
+    for least_of_largest, there in ((0.1, {2}), (0.2, {0, 1})):
+        cleaned, _ = merge_crumbs(
+            labels, mesh.face_areas, centres_of(mesh), adjacency_of(mesh), 0.005, least_of_largest
+        )
+        assert set(cleaned[band]) <= there
+        np.testing.assert_array_equal(cleaned[~band], labels[~band])
+
+
 def test_after_cleaning_no_part_is_too_small_and_large_ones_keep_their_label():
     mesh = creature(0.2)
     labels = np.random.default_rng(0).integers(0, 5, mesh.n_faces)

@@ -88,6 +88,7 @@ class PosedMesh:
         marked: IntArray | None = None,
         crease: float = CREASE,
         width: float = WIDTH,
+        least_of_largest: float = 0.0,
     ) -> tuple[IntArray, FaceAdjacency]:
         """Label the polygons, and clean the labels.
 
@@ -105,6 +106,8 @@ class PosedMesh:
             Neighbouring polygons between which a border is welcome.
         crease, width : float
             How much creases draw borders, and over how many smoothing lengths; see `crease_weights`, `cut_borders`.
+        least_of_largest : float
+            Connected parts under this share of the largest one with their label do, too.
 
         Returns
         -------
@@ -120,7 +123,7 @@ class PosedMesh:
             labels = cut_borders(
                 posteriors, self.areas, self._centres, self.neighbours, weights, length, labels, width=width
             )
-        return merge_crumbs(labels, self.areas, self._centres, self.neighbours, least_share)
+        return merge_crumbs(labels, self.areas, self._centres, self.neighbours, least_share, least_of_largest)
 
 
 @dataclass(frozen=True)

@@ -70,7 +70,12 @@ def connected_regions(labels: IntArray, adjacency: FaceAdjacency) -> IntArray:
 
 
 def merge_crumbs(
-    labels: IntArray, areas: FloatArray, centres: FloatArray, adjacency: FaceAdjacency, min_share: float
+    labels: IntArray,
+    areas: FloatArray,
+    centres: FloatArray,
+    adjacency: FaceAdjacency,
+    min_share: float,
+    least_of_largest: float = 0.0,
 ) -> tuple[IntArray, FaceAdjacency]:
     """Give every connected region under a share of the area the label of a neighbour.
 
@@ -87,6 +92,9 @@ def merge_crumbs(
     adjacency : FaceAdjacency
     min_share : float
         Between 0 and 1.
+    least_of_largest : float
+        A region is a crumb as well under this share of the largest one with its label, as the narrow band between two
+        others where the labels pass through a third.
 
     Returns
     -------
@@ -98,6 +106,9 @@ def merge_crumbs(
     label_of = np.zeros(count, dtype=np.int64)
     label_of[region] = labels
     least = min_share * areas.sum()
+    largest = np.zeros(int(labels.max()) + 2)
+    np.maximum.at(largest, label_of + 1, size)
+    needed = np.maximum(least, least_of_largest * largest[label_of + 1])
 
     borders = _border_lengths(region, adjacency)
     owner = np.arange(count)
@@ -110,7 +121,7 @@ def merge_crumbs(
 
     for crumb in np.argsort(size, kind="stable"):
         # A crumb may have grown by smaller ones before its turn.
-        if owner[crumb] != crumb or size[crumb] >= least:
+        if owner[crumb] != crumb or size[crumb] >= needed[crumb]:
             continue
         shared: dict[int, float] = defaultdict(float)
         for neighbour, length in borders[crumb].items():

@@ -52,6 +52,9 @@ SIGNATURE_OFFSET = 1.0
 """Added to the signature, whose mean is 1, before its logarithm: smaller values change much from pose to pose and say
 little, and tiny loose parts take no part in low energies."""
 MOST_SMOOTHNESS = 10
+STRAY = 0.15
+"""A connected part of a segment under this share of its largest one is a crumb, too: a band between two others where
+the signature passes by a third one's, as head between back and tail."""
 MAX_SAMPLES = 20_000
 """Vertices that take part in the mixture, spread evenly by area where there are more."""
 MOST_NUMBERS = 3_000_000
@@ -672,8 +675,12 @@ class PoseSegmentation(PoseDescriber):
             posteriors = self._joined(of_components, joined)
         else:
             posteriors = posed.mean(works, lambda work: self._smoothed(work, joined), progress)
-        creases = {} if n_groups is None else {"crease": REGION_CREASE, "width": REGION_WIDTH}
-        return posed.labelled(works, posteriors, length, self._least_share(min_share), marked, **creases)
+        least = self._least_share(min_share)
+        if n_groups is None:
+            how = {"least_of_largest": STRAY if least > 0 else 0.0}
+        else:
+            how = {"crease": REGION_CREASE, "width": REGION_WIDTH}
+        return posed.labelled(works, posteriors, length, least, marked, **how)
 
     def _fields(self, pose: PoseSignature) -> FloatArray:
         """(n', FIELDS) the signature along the axes on which the components lie farthest apart."""
