@@ -23,6 +23,7 @@ from builders import (
 
 from wks_segment.blender import operators, panel, panel_models
 from wks_segment.blender import poses as reader
+from wks_segment.blender.characters import selected_meshes
 from wks_segment.blender.poses import Character
 from wks_segment.core import PoseSegmentation, hierarchy, spectrum
 
@@ -256,6 +257,32 @@ def test_buttons_are_grey_without_a_selected_mesh(learned, name):
     bpy.context.scene.collection.objects.link(camera)
     select(camera)
     assert "Select the mesh of a character first" in refusal(getattr(OPS, name))
+
+
+def test_a_selected_armature_stands_for_its_visible_meshes(settings):
+    body, coat, hidden = limbed_rigged("Body"), limbed("Coat"), limbed("Hidden")
+    for obj in (coat, hidden):
+        obj.parent = body.parent
+    bpy.context.view_layer.update()
+    hidden.hide_set(True)
+    other, alone = limbed_rigged("Other"), limbed("Alone")
+    select(body.parent, alone)
+    assert [obj.name for obj in selected_meshes(bpy.context)] == ["Alone", "Body", "Coat"]
+    select(body.parent, coat, other)
+    assert [obj.name for obj in selected_meshes(bpy.context)] == ["Coat", "Other"]
+
+
+def test_the_armature_is_all_that_needs_to_be_selected(settings):
+    obj = limbed_rigged()
+    select(obj.parent)
+    settings.source, settings.pose_count = "FRAMES", 3
+    settings.n_segments, settings.n_eigenpairs, settings.n_energies = 3, 60, 40
+    assert OPS.learn() == {"FINISHED"}
+    learned = labels_of(obj)
+    assert OPS.clear() == {"FINISHED"}
+    assert read_labels(obj.data) is None
+    assert OPS.apply() == {"FINISHED"}
+    assert (labels_of(obj) == learned).mean() > 0.95
 
 
 @pytest.mark.parametrize("name", ["apply", "save_model"])

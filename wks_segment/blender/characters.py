@@ -116,6 +116,18 @@ def mesh_objects(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
     return [obj for obj in meshes if not _draws_a_bone(obj)]
 
 
+def selected_meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The selected mesh objects, by name, and the visible ones on a selected armature if none of these is selected.
+
+    Who clicks on a character often gets its bones.
+    """
+    chosen = mesh_objects(context.selected_objects)
+    rigs = {obj for obj in context.selected_objects if obj.type == "ARMATURE"} - {armature_of(obj) for obj in chosen}
+    if not rigs:
+        return chosen
+    return mesh_objects([*chosen, *(obj for obj in context.visible_objects if armature_of(obj) in rigs)])
+
+
 def why_no_mesh(objects: Iterable[bpy.types.Object]) -> str:
     """What to do to get a mesh, if none of the objects is one."""
     for obj in objects:

@@ -13,7 +13,7 @@ from ..core import PoseSegmentation, PoseSignature, Ranking, SignatureCache, des
 from ..core.description import Progress
 from . import models, tasks
 from . import poses as reader
-from .characters import group, mesh_objects
+from .characters import group, selected_meshes
 from .errors import UserError
 from .poses import Pose
 from .preferences import model_folder
@@ -114,7 +114,7 @@ class RankWork:
         models.adopt(context.scene.wks_segment)
         found = candidates(context, report)
         with report.stage("read"):
-            character = active_character(context, group(mesh_objects(context.selected_objects)))
+            character = active_character(context, group(selected_meshes(context)))
             report.poses = reader.read_objects(context, [character])
         watch = Watch(context.scene, [character])
         return cls(found, report.poses, watch, report, session_of(context).cache)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import bpy
 
 from . import poses as reader
-from .characters import Character, armature_of, group, mesh_objects
+from .characters import Character, armature_of, group, selected_meshes
 from .errors import UserError
 from .pose_library import read_actions
 from .poses import Pose
@@ -23,7 +23,7 @@ def read_training_poses(context: bpy.types.Context, settings: WKSSegmentSettings
     UserError
         If there are none there, or they cannot be used.
     """
-    characters = group(mesh_objects(context.selected_objects))
+    characters = group(selected_meshes(context))
     with report.stage("read"):
         if settings.source == "OBJECTS":
             poses = reader.read_objects(context, characters)

@@ -14,7 +14,7 @@ from ..core.description import Progress
 from ..core.mesh import FloatArray, IntArray
 from . import models, tasks
 from . import poses as reader
-from .characters import Character, group, mesh_objects
+from .characters import Character, group, mesh_objects, selected_meshes
 from .errors import UserError
 from .poses import Pose
 from .report import Report, segment_warnings
@@ -93,7 +93,8 @@ class Work:
         model = tasks.stored_model(settings) if model is None else model
         model.smoothness = settings.smoothness
         with report.stage("read"):
-            report.poses = reader.read_objects(context, group(mesh_objects(objects or context.selected_objects)))
+            chosen = mesh_objects(objects) if objects else selected_meshes(context)
+            report.poses = reader.read_objects(context, group(chosen))
         return cls._read(context, model, report.poses, report, learns=False)
 
     @classmethod

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..bake import bake_id_maps
-from ..characters import group, mesh_objects
+from ..characters import group, selected_meshes
 from ..errors import UserError
 from . import feedback
 
@@ -32,7 +32,7 @@ class WKS_SEGMENT_OT_bake(bpy.types.Operator):
         warnings: list[str] = []
         try:
             with feedback.cursor_progress(context) as progress:
-                for character in group(mesh_objects(context.selected_objects)):
+                for character in group(selected_meshes(context)):
                     baked = bake_id_maps(context, character, settings.style(), size, margin, unwrap, warnings, progress)
                     images += [f'"{id_map.image.name}"' for id_map in baked]
         except UserError as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .. import segments
-from ..characters import mesh_objects
+from ..characters import selected_meshes
 from ..labels import clear_labels, has_labels
 from ..separate import unite, whole_of
 from . import feedback
@@ -25,7 +25,7 @@ class WKS_SEGMENT_OT_clear(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         wholes = {whole for obj in context.selected_objects if (whole := whole_of(obj)) is not None}
         kept = sum(unite(context, whole) for whole in wholes)
-        meshes = {obj.data for obj in mesh_objects(context.selected_objects) if obj.data.library is None}
+        meshes = {obj.data for obj in selected_meshes(context) if obj.data.library is None}
         cleared = sum(clear_labels(mesh) for mesh in meshes)
         context.scene.wks_segment.applied = ""
         segments.fill(context.scene.wks_segment)

@@ -9,7 +9,7 @@ import bpy
 
 from ...core.description import Progress
 from .. import segments
-from ..characters import mesh_objects, why_no_mesh
+from ..characters import selected_meshes, why_no_mesh
 from ..jobs import BUSY, desk_of
 from ..labels import has_labels
 from ..messages import in_panel, in_report, in_tooltip
@@ -91,7 +91,7 @@ def in_object_mode(cls: type[bpy.types.Operator], context: bpy.types.Context) ->
 
 def has_selected_mesh(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """For `poll`: whether a mesh is selected; sets the message if not."""
-    if not mesh_objects(context.selected_objects):
+    if not selected_meshes(context):
         explain(cls, why_no_mesh(context.selected_objects))
         return False
     return True
@@ -99,7 +99,7 @@ def has_selected_mesh(cls: type[bpy.types.Operator], context: bpy.types.Context)
 
 def has_labelled_mesh(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """For `poll`: whether a selected mesh has segments; sets the message if not."""
-    if not any(has_labels(obj.data) for obj in mesh_objects(context.selected_objects)):
+    if not any(has_labels(obj.data) for obj in selected_meshes(context)):
         explain(cls, "Select an object that has segments")
         return False
     return True

@@ -7,7 +7,7 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from .. import tasks
-from ..characters import group, mesh_objects
+from ..characters import group, selected_meshes
 from ..corrected import GROUP, SOURCES, corrected_labels, corrected_parts, corrected_weights
 from ..edits import keep_by_hand
 from ..errors import UserError
@@ -39,7 +39,7 @@ class WKS_SEGMENT_OT_segments_from(bpy.types.Operator):
         report = Report([])
         labels, weights = {}, {}
         try:
-            for character in group(mesh_objects(context.selected_objects)):
+            for character in group(selected_meshes(context)):
                 found = corrected_parts(character, self.source)
                 labels[character] = corrected_labels(character, self.source, found)
                 weights[character] = corrected_weights(character, found)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..characters import group, mesh_objects
+from ..characters import group, selected_meshes
 from ..errors import UserError
 from ..labels import labels_on
 from ..separate import separate, whole_of
@@ -30,7 +30,7 @@ class WKS_SEGMENT_OT_separate(bpy.types.Operator):
         style = context.scene.wks_segment.style()
         pieces = []
         try:
-            for character in group(mesh_objects(context.selected_objects)):
+            for character in group(selected_meshes(context)):
                 for obj in character.objects:
                     if whole_of(obj) is not None:
                         raise UserError(f'"{obj.name}" is separated already: Clear it first')

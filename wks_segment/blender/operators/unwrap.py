@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import EnumProperty
 
-from ..characters import group, mesh_objects
+from ..characters import group, selected_meshes
 from ..errors import UserError
 from ..labels import labels_on
 from ..uv_maps import METHODS, check_room, unwrap_parts, write_uv_map
@@ -31,7 +31,7 @@ class WKS_SEGMENT_OT_unwrap(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
-            objects = [obj for of in group(mesh_objects(context.selected_objects)) for obj in of.objects]
+            objects = [obj for of in group(selected_meshes(context)) for obj in of.objects]
             meshes = {obj.data: labels for obj in objects if (labels := labels_on(obj.data)) is not None}
             for mesh in meshes:
                 check_room(mesh)
