@@ -201,14 +201,25 @@ def test_a_change_can_be_undone_by_itself_and_redone(walker, settings, session):
     two = labels_of(bpy.data.objects[name])
     assert bpy.ops.ed.undo() == {"FINISHED"}
     np.testing.assert_array_equal(labels_of(bpy.data.objects[name]), four)
-    assert bpy.context.scene.wks_segment.n_segments == 2
-    assert not session.follows(bpy.context.scene)
+    assert bpy.context.scene.wks_segment.n_segments == 4, "the setting stays when its labels go"
+    assert session.follows(bpy.context.scene)
     assert bpy.ops.ed.redo() == {"FINISHED"}
     np.testing.assert_array_equal(labels_of(bpy.data.objects[name]), two)
+    assert bpy.context.scene.wks_segment.n_segments == 2
     assert session.follows(bpy.context.scene)
     bpy.context.scene.wks_segment.n_segments = 3
     rest(session)
     assert labels_of(bpy.data.objects[name]).max() == 2
+
+
+def test_undo_leaves_a_setting_that_labels_do_not_follow(walker, settings, session):
+    settings.live, settings.n_segments, settings.snap_to = False, 2, {"sharp"}
+    bpy.ops.ed.undo_push(message="settings")
+    walker.location.x = 1
+    bpy.ops.ed.undo_push(message="moved")
+    assert bpy.ops.ed.undo() == {"FINISHED"}
+    assert bpy.context.scene.wks_segment.n_segments == 2
+    assert bpy.context.scene.wks_segment.snap_to == {"sharp"}
 
 
 def test_after_undo_of_learning_nothing_follows(session, settings):

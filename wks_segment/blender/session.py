@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -210,6 +211,14 @@ class Session:
             return
         if any(member.found() is None for pose in self.work.poses for member in pose.character.members):
             self.drop()
+            return
+        scene = bpy.context.scene
+        settings = scene.wks_segment
+        if not settings.live or settings.preview or self.is_slow or not self.holds(scene) or self.follows(scene):
+            return
+        # Blender has a step for the setting and one for the labels that followed it. To the user they are one.
+        for name, value in ast.literal_eval(settings.applied.partition(":")[2]).items():
+            setattr(settings, name, set(value) if name == "snap_to" else value)
 
 
 def _values(settings: WKSSegmentSettings) -> dict[str, Any]:
