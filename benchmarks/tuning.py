@@ -26,7 +26,7 @@ from benchmarks.speed import table_row
 from wks_segment.blender import files
 from wks_segment.blender.session import session_of
 from wks_segment.core import PoseSegmentation
-from wks_segment.core.labelling import PosedMesh
+from wks_segment.core.posed_mesh import PosedMesh
 
 CHANGES: list[tuple[str, dict[str, Any]]] = [
     ("12 segments", {"n_segments": 12}),

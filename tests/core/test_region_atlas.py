@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from shapes import LIMBS, figure, icosphere
 
-from wks_segment.core import PoseSegmentation, TriangleMesh
+from wks_segment.core import PoseSegmentation, TriangleMesh, labeller
 from wks_segment.core.region_atlas import RegionAtlas, Traits, sides
 
 
@@ -88,7 +88,7 @@ def test_poses_vote_on_the_sides_of_their_mesh(model, monkeypatch):
     given = {0.0: [1, 1, 1, 0, -1, 1], 0.1: [1, 1, 0, 0, 1, 1], 0.2: [1, -1, 0, 0, -1, 0], 0.3: [1, 1, 0, 0, -1, 0]}
     poses = [TriangleMesh(mesh.vertices + (0, 0, height), mesh.faces) for height in given]
     votes = iter(given.values())
-    monkeypatch.setattr(model, "_sides_seen_in", lambda *arguments: np.array(next(votes)))
+    monkeypatch.setattr(labeller, "_sides_seen_in", lambda *arguments: np.array(next(votes)))
     found = model.polygon_sides(poses, [np.arange(mesh.n_faces) % 6] * 4, np.zeros(6, int))
     assert found.tolist() == [1, 1, 0, 0, -1, 0]
 

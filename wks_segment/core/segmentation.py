@@ -16,21 +16,20 @@ from threadpoolctl import threadpool_limits
 
 from . import model_file
 from .cache import Cache
-from .cut import REGION_CREASE, REGION_WIDTH
 from .description import PoseDescriber, Progress
 from .explained import left_out_likelihoods, likely_mean
 from .grouping import Grouping
 from .intrinsic import Laplacian
-from .labelling import PosedMesh
+from .labeller import Labeller
 from .laplacian import unit_area_masses
-from .layout import SMOOTHING_LENGTH, of_one_mesh
+from .layout import SMOOTHING_LENGTH
 from .learning import AUTO, MIN_SHARE, Candidates, Plan
 from .mesh import FloatArray, IntArray, TriangleMesh
 from .mixture import CovarianceType, GaussianMixture, drawn_evenly, fit_mixtures
 from .part_notes import PartNotes
 from .pose_signature import PoseSignature
-from .region_atlas import FIELDS, VOTERS, RegionAtlas, Regions, Traits, mean_traits, side_field, sides_of_parts
-from .regions import FaceAdjacency, connected_regions
+from .region_atlas import RegionAtlas
+from .regions import connected_regions
 from .spectrum import Accuracy
 from .surface import Pieces
 from .workpiece import Workpiece
@@ -46,19 +45,12 @@ MIXED = 0.5
 """Share of the work when the mixture is fitted."""
 GROUPED = 0.9
 """Share of the work when its components are grouped."""
-CLEANED = 0.7
-"""Share of the time that finding regions takes, the rest is telling which is which."""
 SIGNATURE_OFFSET = 1.0
 """Added to the signature, whose mean is 1, before its logarithm: smaller values change much from pose to pose and say
 little, and tiny loose parts take no part in low energies."""
 MOST_SMOOTHNESS = 10
-STRAY = 0.15
-"""A connected part of a segment under this share of its largest one is a crumb, too: a band between two others where
-the signature passes by a third one's, as head between back and tail."""
 MAX_SAMPLES = 20_000
 """Vertices that take part in the mixture, spread evenly by area where there are more."""
-MOST_NUMBERS = 3_000_000
-"""Posteriors of components at vertices that are kept at most; above that only those of segments are computed."""
 PAPER: dict[str, Any] = {
     "covariance_type": "diag", "scaling": "raw", "laplacian": "cotangent", "smoothness": 0.0,
 }  # fmt: skip
@@ -240,16 +232,14 @@ class PoseSegmentation(PoseDescriber):
 
     def predict_proba(self, mesh: AnyPose) -> FloatArray:
         """(n, n_segments) posterior of each segment at each vertex; rows sum to 1."""
-        self._fitted()
-        work = self._work(mesh)
-        return work.surface.to_vertices(self._joined(self._posteriors(work)))
+        labeller, work = self._labeller(), self._work(mesh)
+        return work.surface.to_vertices(labeller.joined(labeller.posteriors(work)))
 
     @threadpool_limits.wrap(limits=1, user_api="blas")  # on arrays this small, threads wait for each other
     def predict_soft(self, mesh: AnyPose) -> FloatArray:
         """(n, n_segments) posteriors as `predict_proba` has them, smoothed as far as the labels of faces are."""
-        self._fitted()
-        work = self._work(mesh)
-        posteriors = self._smoothed(work, self.n_segments_)
+        labeller, work = self._labeller(), self._work(mesh)
+        posteriors = labeller.smoothed(work, labeller.n_segments)
         if self._setting("smoothness") > 0:
             # Obtuse triangles let the heat flow a little beyond 0 and 1.
             posteriors = np.clip(posteriors, 0, 1).astype(np.float64)
@@ -284,10 +274,8 @@ class PoseSegmentation(PoseDescriber):
         `min_share` is 0.005 if not given, and 0 without smoothing.
         A loose piece that is smaller as a whole takes the label of what is next to it.
         """
-        self._fitted()
-        return self._clean([self._work(mesh)], None, min_share)[0]
+        return self._labeller().clean([self._work(mesh)], None, self._least_share(min_share))[0]
 
-    @threadpool_limits.wrap(limits=1, user_api="blas")  # as above
     def segment_regions(self, mesh: AnyPose, min_share: float | None = None) -> IntArray:
         """(m,) connected part of each face: left and right hand are two.
 
@@ -297,11 +285,10 @@ class PoseSegmentation(PoseDescriber):
         connected parts of the components, in the order of these. Parts under `min_share` of the area belong to the
         part next to them.
         """
-        self._fitted()
-        work = self._work(mesh)
+        labeller, work, least_share = self._labeller(), self._work(mesh), self._least_share(min_share)
         if self.regions_ is None:
-            return connected_regions(*self._clean([work], None, min_share))
-        return self._named_regions(self.regions_, work, min_share)
+            return connected_regions(*labeller.clean([work], None, least_share))
+        return labeller.named_regions(self.regions_, work, least_share)
 
     def segment_polygons(
         self,
@@ -336,9 +323,9 @@ class PoseSegmentation(PoseDescriber):
         ValueError
             If there is no pose, or the lengths do not fit.
         """
-        return self._clean(self._posed(poses, polygons), polygons, min_share, progress, marked)[0]
+        works = self._posed(poses, polygons)
+        return self._labeller().clean(works, polygons, self._least_share(min_share), progress, marked)[0]
 
-    @threadpool_limits.wrap(limits=1, user_api="blas")  # as above
     def polygon_sides(
         self,
         poses: Sequence[AnyPose],
@@ -365,22 +352,10 @@ class PoseSegmentation(PoseDescriber):
         ValueError
             As by `segment_polygons`.
         """
-        works, atlas = self._posed(poses, polygons), self.sides_
-        if atlas is None:
+        works = self._posed(poses, polygons)
+        if self.sides_ is None:
             return np.zeros(len(labels), dtype=np.int64)
-        voters = sorted(set(np.linspace(0, len(works) - 1, VOTERS).round().astype(int).tolist()))
-        given: list[IntArray] = []
-        for alike in _together([works[i] for i in voters]):
-            regions = self._regions(atlas.n_groups, alike)
-            names = atlas.named(mean_traits([self._traits(regions, work) for work in alike]))
-            of_faces = atlas.sides_of(regions.numbered(names, len(atlas.side)))
-            for work in alike:
-                polygon_of = polygons[voters[len(given)]]
-                given.append(self._sides_seen_in(work, of_faces, regions, polygon_of, labels))
-                if progress:
-                    progress(len(given) / len(voters))
-        # Half left and half neither is neither.
-        return np.trunc(np.median(given, axis=0)).astype(np.int64)
+        return self._labeller().sides(self.sides_, works, polygons, labels, progress)
 
     def with_segments(
         self,
@@ -617,79 +592,10 @@ class PoseSegmentation(PoseDescriber):
         """Smoothing length, in units of the square root of the area."""
         return float(self._setting("smoothness") * SMOOTHING_LENGTH)
 
-    def _posteriors(self, work: Workpiece) -> FloatArray:
-        """(n', K) posteriors of the components at the vertices of a pose."""
-        return self._fitted().posteriors(self._standardised(work.pose.signature))
-
-    def _joined(self, posteriors: FloatArray, n_groups: int | None = None) -> FloatArray:
-        """(…, n_groups) sums of (…, K) posteriors over each group's components; over each segment's if not given."""
-        if self.grouping_ is None:
-            return posteriors
-        n_groups = n_groups or self.n_segments_
-        return np.asarray(posteriors @ np.eye(n_groups, dtype=posteriors.dtype)[self.grouping_.groups(n_groups)])
-
-    def _smoothed(self, work: Workpiece, n_groups: int | None) -> FloatArray:
-        """(n', n_groups) smoothed posteriors of groups at the vertices of a pose; of components if None.
-
-        Those of components are kept: they are the same for every number of groups.
-        """
-        mixture, length = self._fitted(), self._length()
-
-        def smooth(posteriors: FloatArray) -> FloatArray:
-            return work.flows.over(length).smooth(posteriors) if length > 0 else posteriors
-
-        if not self._keeps(len(work.pose.signature)):
-            return smooth(self._joined(self._posteriors(work), n_groups))
-        raw = work.memo.get("posteriors", (mixture,), lambda: self._posteriors(work))
-        of_components = work.memo.get("smoothed", (mixture, length), lambda: smooth(raw))
-        return of_components if n_groups is None else self._joined(of_components, n_groups)
-
-    def _keeps(self, count: int) -> bool:
-        """Whether posteriors of components at so many places are kept."""
-        return count * len(self._fitted().weights) <= MOST_NUMBERS
-
-    @threadpool_limits.wrap(limits=1, user_api="blas")  # on arrays this small, threads wait for each other
-    def _clean(
-        self,
-        works: Sequence[Workpiece],
-        polygons: Sequence[IntArray] | None,
-        min_share: float | None,
-        progress: Callable[[float], None] | None = None,
-        marked: IntArray | None = None,
-        n_groups: int | None = None,
-    ) -> tuple[IntArray, FaceAdjacency]:
-        """Segments, or with `n_groups` what regions are parts of; of polygons (None: triangles). See `PosedMesh`."""
-        mixture, length = self._fitted(), self._length()
-        # What poses of one mesh have in common is kept with the first.
-        kind, memo = ("faces" if polygons is None else "polygons"), works[0].memo
-        posed = memo.get(
-            f"posed {kind}", (*(work.pose for work in works), *(polygons or ())), lambda: PosedMesh(works, polygons)
-        )
-        joined = n_groups or self.n_segments_
-        if self._keeps(max(posed.n_polygons, *(len(work.pose.signature) for work in works))):
-            of_components = memo.get(
-                f"mean {kind}",
-                (posed, mixture, length),
-                lambda: posed.mean(works, lambda work: self._smoothed(work, None), progress),
-            )
-            posteriors = self._joined(of_components, joined)
-        else:
-            posteriors = posed.mean(works, lambda work: self._smoothed(work, joined), progress)
-        least = self._least_share(min_share)
-        if n_groups is None:
-            how = {"least_of_largest": STRAY if least > 0 else 0.0}
-        else:
-            how = {"crease": REGION_CREASE, "width": REGION_WIDTH}
-        return posed.labelled(works, posteriors, length, least, marked, **how)
-
-    def _fields(self, pose: PoseSignature) -> FloatArray:
-        """(n', FIELDS) the signature along the axes on which the components lie farthest apart."""
+    def _labeller(self) -> Labeller:
+        """The fitted mixture with the settings as they are."""
         mixture = self._fitted()
-        axes = np.linalg.eigh((mixture.means * mixture.weights[:, None]).T @ mixture.means)[1][:, ::-1][:, :FIELDS]
-        # Which way an axis points is up to the library; a model must mean the same everywhere.
-        axes *= np.sign(axes[np.abs(axes).argmax(axis=0), np.arange(axes.shape[1])])
-        fields = self._standardised(pose.signature) @ axes
-        return np.pad(fields, ((0, 0), (0, FIELDS - axes.shape[1])))
+        return Labeller(mixture, self.grouping_, self._standardised, self.n_segments_, self._length())
 
     def _learn_regions(
         self, works: Sequence[Workpiece], rest: TriangleMesh | None, tick: Callable[[float], None]
@@ -707,72 +613,5 @@ class PoseSegmentation(PoseDescriber):
             def of_atlas(share: float, begun: int = i) -> None:
                 tick((begun + share) / len(new))
 
-            atlases[n_groups] = self._atlas(n_groups, works, rest, of_atlas)
+            atlases[n_groups] = self._labeller().atlas(n_groups, works, rest, of_atlas)
         self.regions_, self.sides_ = (atlases[n_groups] for n_groups in numbers)
-
-    @threadpool_limits.wrap(limits=1, user_api="blas")  # as above
-    def _atlas(
-        self, n_groups: int, works: Sequence[Workpiece], rest: TriangleMesh | None, tick: Callable[[float], None]
-    ) -> RegionAtlas:
-        """The connected regions of so many groups on the learned poses, and which are left and right."""
-        first = works[0].surface.original
-        if rest is not None and not np.array_equal(rest.faces, first.faces):
-            raise ValueError("rest has other faces than the first pose: pass the same mesh, in its rest position")
-        found: list[Regions] = []
-        traits: list[Traits] = []
-        for alike in _together(works):
-
-            def cleaning(share: float, begun: int = len(traits), count: int = len(alike)) -> None:
-                tick((begun + CLEANED * share * count) / len(works))
-
-            regions = self._regions(n_groups, alike, None, cleaning)
-            found.append(regions)
-            begun = len(traits)
-            for i, work in enumerate(alike):
-                tick((begun + CLEANED * len(alike) + (1 - CLEANED) * i) / len(works))
-                traits.append(self._traits(regions, work))
-        centres = found[0].centres(first if rest is None else rest)
-        return RegionAtlas.learned(n_groups, traits, centres, alike=len(found) == 1)
-
-    def _sides_seen_in(
-        self, work: Workpiece, side: IntArray, regions: Regions, polygon_of: IntArray, labels: IntArray
-    ) -> IntArray:
-        """(p,) what `polygon_sides` gives, from one pose, given the side of each face's region."""
-        assert self.sides_ is not None
-        field = work.memo.get("sides", (regions, self.sides_), lambda: side_field(work, side))
-        neighbours = work.memo.get("polygons", (polygon_of,), lambda: work.neighbours.between_polygons(polygon_of))
-        return sides_of_parts(work.surface, field, polygon_of, labels, MIN_SHARE, neighbours)
-
-    @threadpool_limits.wrap(limits=1, user_api="blas")  # as above
-    def _regions(
-        self,
-        n_groups: int,
-        works: Sequence[Workpiece],
-        min_share: float | None = None,
-        progress: Callable[[float], None] | None = None,
-    ) -> Regions:
-        """Connected regions of so many groups on a mesh, agreed on by poses of it."""
-
-        def found() -> Regions:
-            labels, neighbours = self._clean(works, None, min_share, progress, n_groups=n_groups)
-            return Regions.of(labels, neighbours, works[0].surface.original)
-
-        poses = (work.pose for work in works)
-        made_from = self.mixture_, self.grouping_, n_groups, self._length(), self._least_share(min_share), *poses
-        return works[0].memo.get("regions", made_from, found)
-
-    @threadpool_limits.wrap(limits=1, user_api="blas")  # as above
-    def _traits(self, regions: Regions, work: Workpiece) -> Traits:
-        """What tells regions apart in a pose."""
-        fields = work.memo.get("fields", (self.mixture_, self.centre_), lambda: self._fields(work.pose))
-        return work.memo.get("traits", (regions, fields), lambda: regions.traits(work, fields))
-
-    def _named_regions(self, atlas: RegionAtlas, work: Workpiece, min_share: float | None) -> IntArray:
-        """(m,) region of each face, numbered as in the atlas, and on from there."""
-        regions = self._regions(atlas.n_groups, [work], min_share)
-        return regions.numbered(atlas.named(self._traits(regions, work)), len(atlas.side))
-
-
-def _together(works: Sequence[Workpiece]) -> list[Sequence[Workpiece]]:
-    """The poses whose regions are the same ones: all that have the same faces, or each alone."""
-    return [works] if of_one_mesh([work.pose for work in works]) else [[work] for work in works]
