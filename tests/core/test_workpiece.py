@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from shapes import figure
 
-from wks_segment.core import PoseSegmentation, Workpiece
-from wks_segment.core import segmentation as module
+from wks_segment.core import PoseSegmentation, Workpiece, labeller
 
 POSES = [figure(), figure(0.4, 0.1), figure(0.1, 0.5)]
 POLYGONS = [np.arange(POSES[0].n_faces) // 2] * len(POSES)
@@ -70,7 +69,7 @@ def test_a_model_learned_from_workpieces_is_the_same(model, described):
 
 def test_where_all_components_would_be_too_many_numbers_labels_are_nearly_the_same(model, described, monkeypatch):
     usual = model.segment_polygons(described, POLYGONS)
-    monkeypatch.setattr(module, "MOST_NUMBERS", 0)
+    monkeypatch.setattr(labeller, "MOST_NUMBERS", 0)
     assert (model.segment_polygons(described, POLYGONS) == usual).mean() > 0.999
 
 
