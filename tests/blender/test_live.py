@@ -222,6 +222,45 @@ def test_undo_leaves_a_setting_that_labels_do_not_follow(walker, settings, sessi
     assert bpy.context.scene.wks_segment.snap_to == {"sharp"}
 
 
+def test_undo_of_something_else_leaves_a_number_that_was_refused(walker, settings, session):
+    settings.n_segments = 60
+    rest(session)
+    assert "takes a new Learn and Segment" in session.said
+    bpy.ops.ed.undo_push(message="the number")
+    walker.location.x = 1
+    bpy.ops.ed.undo_push(message="moved")
+    assert bpy.ops.ed.undo() == {"FINISHED"}
+    assert bpy.context.scene.wks_segment.n_segments == 60
+    assert "takes a new Learn and Segment" in session.said
+
+
+def test_what_was_undone_does_not_come_back_when_a_preview_is_discarded(walker, settings, session):
+    bpy.ops.ed.undo_push(message="learned")
+    settings.n_segments = 2
+    bpy.ops.ed.undo_push(message="the slider")
+    rest(session)
+    assert bpy.ops.ed.undo() == {"FINISHED"}
+    settings = bpy.context.scene.wks_segment
+    settings.preview, settings.n_segments = True, 3
+    rest(session)
+    session.discard(bpy.context.scene)
+    assert settings.n_segments == 4
+
+
+def test_between_two_steps_of_redo_an_update_is_offered(walker, settings, session):
+    bpy.ops.ed.undo_push(message="learned")
+    settings.n_segments = 2
+    bpy.ops.ed.undo_push(message="the slider")
+    rest(session)
+    bpy.ops.ed.undo()
+    rest(session)
+    bpy.ops.ed.undo()
+    bpy.ops.ed.redo()
+    assert not session.follows(bpy.context.scene)
+    assert not session.waits
+    assert OPS.update.poll()
+
+
 def test_after_undo_of_learning_nothing_follows(session, settings):
     obj = limbed_rigged()
     select(obj)

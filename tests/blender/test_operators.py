@@ -21,9 +21,10 @@ from builders import (
     snapshot,
 )
 
-from wks_segment.blender import operators, panel, panel_models
+from wks_segment.blender import operators, panel, panel_models, segments
 from wks_segment.blender import poses as reader
 from wks_segment.blender.characters import selected_meshes
+from wks_segment.blender.labels import write_labels
 from wks_segment.blender.poses import Character
 from wks_segment.core import PoseSegmentation, hierarchy, spectrum
 
@@ -283,6 +284,32 @@ def test_the_armature_is_all_that_needs_to_be_selected(settings):
     assert read_labels(obj.data) is None
     assert OPS.apply() == {"FINISHED"}
     assert (labels_of(obj) == learned).mean() > 0.95
+
+
+def test_clear_through_the_armature_takes_back_a_separation(settings):
+    body, coat = limbed_rigged("Body"), limbed("Coat")
+    coat.parent = body.parent
+    write_labels(body.data, np.arange(len(body.data.polygons)) % 2)
+    write_labels(coat.data, np.zeros(len(coat.data.polygons), dtype=np.int64))
+    select(body)
+    assert OPS.separate() == {"FINISHED"}
+    pieces = {obj.name for obj in bpy.data.objects} - {"Body", "Coat", body.parent.name}
+    assert len(pieces) == 2
+    select(body.parent)
+    assert OPS.clear() == {"FINISHED"}
+    assert not pieces & {obj.name for obj in bpy.data.objects}
+    assert bpy.data.objects["Body"].visible_get()
+    assert all(read_labels(bpy.data.objects[name].data) is None for name in ("Body", "Coat"))
+
+
+def test_the_list_is_of_the_meshes_on_the_selected_armature(settings):
+    one, other = limbed_rigged("One"), limbed_rigged("Other")
+    for obj in (one, other):
+        write_labels(obj.data, np.zeros(len(obj.data.polygons), dtype=np.int64))
+    select(one.parent)
+    assert segments.labelled(settings) == [one]
+    select()
+    assert segments.labelled(settings) == [one, other]
 
 
 @pytest.mark.parametrize("name", ["apply", "save_model"])

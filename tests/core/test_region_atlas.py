@@ -98,7 +98,8 @@ def test_of_many_poses_some_say_what_is_left_and_right(model):
     polygons = [np.arange(poses[0].n_faces)] * 8
     labels, seen = model.segment_polygons(poses, polygons), []
     side = model.polygon_sides(poses, polygons, labels, seen.append)
-    assert seen == [0.2, 0.4, 0.6, 0.8, 1.0]
+    assert seen == sorted(seen)
+    assert seen[-1] == pytest.approx(1.0)
     for one in ("arm", "leg"):
         assert (side[limb(f"left {one}", 3)] == 1).all()
         assert (side[limb(f"right {one}", 3)] == -1).all()

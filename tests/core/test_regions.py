@@ -61,6 +61,16 @@ def test_a_band_between_two_parts_that_is_small_for_its_label_joins_one_of_them(
         np.testing.assert_array_equal(cleaned[~band], labels[~band])
 
 
+def test_two_bands_side_by_side_do_not_keep_each_other():
+    mesh = grid(100, 10)
+    x = centres_of(mesh)[:, 0] * 100
+    labels = np.select([x < 30, x < 32, x < 34.5, x < 55, x < 75], [0, 2, 3, 1, 2], 3)
+    bands = (x > 30) & (x < 34.5)
+    cleaned, _ = merge_crumbs(labels, mesh.face_areas, centres_of(mesh), adjacency_of(mesh), 0.005, 0.15)
+    assert set(cleaned[bands]) <= {0, 1}
+    np.testing.assert_array_equal(cleaned[~bands], labels[~bands])
+
+
 def test_after_cleaning_no_part_is_too_small_and_large_ones_keep_their_label():
     mesh = creature(0.2)
     labels = np.random.default_rng(0).integers(0, 5, mesh.n_faces)

@@ -121,11 +121,17 @@ def selected_meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
 
     Who clicks on a character often gets its bones.
     """
-    chosen = mesh_objects(context.selected_objects)
-    rigs = {obj for obj in context.selected_objects if obj.type == "ARMATURE"} - {armature_of(obj) for obj in chosen}
-    if not rigs:
-        return chosen
-    return mesh_objects([*chosen, *(obj for obj in context.visible_objects if armature_of(obj) in rigs)])
+    return mesh_objects(with_rigged(context.selected_objects, context.visible_objects))
+
+
+def with_rigged(selected: Iterable[bpy.types.Object], visible: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+    """The selected mesh objects, and those of the visible ones that a selected armature stands for."""
+    selected = list(selected)
+    chosen = [obj for obj in selected if obj.type == "MESH"]
+    rigs = {obj for obj in selected if obj.type == "ARMATURE"} - {armature_of(obj) for obj in chosen}
+    if rigs:
+        chosen += [obj for obj in visible if obj.type == "MESH" and armature_of(obj) in rigs]
+    return chosen
 
 
 def why_no_mesh(objects: Iterable[bpy.types.Object]) -> str:

@@ -66,7 +66,7 @@ class _Sidebar:
                 column.label(text=line)
         for line in wrapped(session.said):
             column.label(text=line)
-        if not session.follows(context.scene) and (slow or session.said or not settings.live):
+        if not session.follows(context.scene) and not session.waits:
             column.operator("wks_segment.update", icon="FILE_REFRESH")
 
     def job(self, context: bpy.types.Context) -> None:

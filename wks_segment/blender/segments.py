@@ -14,7 +14,7 @@ from ..core import PartNotes
 from ..core.mesh import IntArray
 from ..core.part_notes import LONGEST_NAME
 from . import parts
-from .characters import Character, mesh_objects
+from .characters import Character, mesh_objects, with_rigged
 from .edits import by_hand, keep_by_hand, model_labels, rewrite, values
 from .labels import has_labels, labels_on
 from .materials import COMPONENT, recolor_material
@@ -41,7 +41,9 @@ def labelled(settings: WKSSegmentSettings, everywhere: bool = False) -> list[bpy
     if everywhere:
         return found
     in_edit_mode = [obj for obj in found if obj.mode == "EDIT"]
-    return in_edit_mode or [obj for obj in found if obj.select_get()] or found
+    objects = settings.id_data.objects
+    chosen = with_rigged((obj for obj in objects if obj.select_get()), (obj for obj in objects if obj.visible_get()))
+    return in_edit_mode or [obj for obj in found if obj in chosen] or found
 
 
 def meshes_of(objects: list[bpy.types.Object]) -> list[bpy.types.Mesh]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -53,7 +52,15 @@ class Session:
         self._name = ""
         self._due = 0.0
         self.timer = self.tick
-        self._handlers = ((bpy.app.handlers.load_pre, self._on_load), (bpy.app.handlers.undo_post, self._on_undo))
+        self._written: dict[str, dict[str, Any]] = {}
+        """Settings of the labels that were written, by what the scene says of them."""
+        self._stepping = ""
+        """What the scene said of its labels before the step of undo that is taken now."""
+        on = bpy.app.handlers
+        self._handlers = (
+            (on.load_pre, self._on_load), (on.undo_pre, self._before_undo), (on.undo_post, self._on_undo),
+            (on.redo_post, self._on_redo),
+        )  # fmt: skip
         for handlers, function in self._handlers:
             handlers.append(function)
 
@@ -73,6 +80,7 @@ class Session:
         if sum(each.pose.signature.nbytes for each in set(work.described)) > MOST_BYTES:
             self.drop()
         scene.wks_segment.applied = self._state(scene)
+        self._written[scene.wks_segment.applied] = dict(self._before)
 
     def holds(self, scene: bpy.types.Scene) -> bool:
         """Whether the labels in a scene are of the work that is kept."""
@@ -81,6 +89,11 @@ class Session:
     def follows(self, scene: bpy.types.Scene) -> bool:
         """Whether the labels in a scene are those that the settings ask for."""
         return bool(scene.wks_segment.applied == self._state(scene))
+
+    @property
+    def waits(self) -> bool:
+        """Whether labels are to follow in a moment."""
+        return bool(bpy.app.timers.is_registered(self.timer))
 
     @property
     def seconds(self) -> float:
@@ -182,6 +195,7 @@ class Session:
         """Forget the work."""
         self.withdraw()
         self.work, self._name = None, ""
+        self._written.clear()
 
     def close(self) -> None:
         """Forget all, and hear no more of Blender."""
@@ -205,6 +219,10 @@ class Session:
         self.said = ""
 
     @persistent
+    def _before_undo(self, *_: Any) -> None:
+        self._stepping = bpy.context.scene.wks_segment.applied
+
+    @persistent
     def _on_undo(self, *_: Any) -> None:
         self.withdraw()
         if self.work is None:
@@ -213,12 +231,21 @@ class Session:
             self.drop()
             return
         scene = bpy.context.scene
-        settings = scene.wks_segment
-        if not settings.live or settings.preview or self.is_slow or not self.holds(scene) or self.follows(scene):
+        if not self.holds(scene) or scene.wks_segment.applied == self._stepping:
             return
-        # Blender has a step for the setting and one for the labels that followed it. To the user they are one.
-        for name, value in ast.literal_eval(settings.applied.partition(":")[2]).items():
-            setattr(settings, name, set(value) if name == "snap_to" else value)
+        self._before = dict(self._written.get(scene.wks_segment.applied, self._before))
+        if scene.wks_segment.live and not scene.wks_segment.preview:
+            # Blender has a step for a setting and one for the labels that followed it. To the user they are one.
+            self.said = ""
+            for name, value in self._before.items():
+                setattr(scene.wks_segment, name, value)
+
+    @persistent
+    def _on_redo(self, *_: Any) -> None:
+        self.withdraw()
+        scene = bpy.context.scene
+        if self.holds(scene):
+            self._before = dict(self._written.get(scene.wks_segment.applied, self._before))
 
 
 def _values(settings: WKSSegmentSettings) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from .learning import MIN_SHARE
 from .mesh import FloatArray, IntArray, TriangleMesh
 from .mixture import GaussianMixture
 from .posed_mesh import PosedMesh
-from .region_atlas import FIELDS, VOTERS, RegionAtlas, Regions, Traits, mean_traits, side_field, sides_of_parts
+from .region_atlas import FIELDS, RegionAtlas, Regions, Traits, mean_traits, side_field, sides_of_parts
 from .regions import FaceAdjacency
 from .workpiece import Workpiece
 
@@ -28,6 +28,8 @@ CLEANED = 0.7
 STRAY = 0.15
 """A connected part of a segment under this share of its largest one is a crumb, too: a band between two others where
 the signature passes by a third one's, as head between back and tail."""
+VOTERS = 5
+"""Poses of a mesh that say which of its parts are left and right; more would not say it more surely."""
 MOST_NUMBERS = 3_000_000
 """Posteriors of components at vertices that are kept at most; above that only those of segments are computed."""
 
@@ -97,7 +99,7 @@ class Labeller:
     ) -> tuple[IntArray, FaceAdjacency]:
         """Segments, or with `n_groups` what regions are parts of; of polygons (None: triangles). See `PosedMesh`."""
         # What poses of one mesh have in common is kept with the first.
-        kind, memo = ("faces" if polygons is None else "polygons"), works[0].memo
+        kind, memo = f"{len(works)} {'faces' if polygons is None else 'polygons'}", works[0].memo
         posed = memo.get(
             f"posed {kind}", (*(work.pose for work in works), *(polygons or ())), lambda: PosedMesh(works, polygons)
         )
@@ -121,7 +123,7 @@ class Labeller:
     def named_regions(self, atlas: RegionAtlas, work: Workpiece, least_share: float) -> IntArray:
         """(m,) region of each face, numbered as in the atlas, and on from there."""
         regions = self._regions(atlas.n_groups, [work], least_share)
-        return regions.numbered(atlas.named(self._traits(regions, work)), len(atlas.side))
+        return regions.numbered(atlas.named(self._traits(regions, work, 1)), len(atlas.side))
 
     @threadpool_limits.wrap(limits=1, user_api="blas")  # as above
     def atlas(
@@ -146,7 +148,7 @@ class Labeller:
             begun = len(traits)
             for i, work in enumerate(alike):
                 tick((begun + CLEANED * len(alike) + (1 - CLEANED) * i) / len(works))
-                traits.append(self._traits(regions, work))
+                traits.append(self._traits(regions, work, len(alike)))
         centres = found[0].centres(first if rest is None else rest)
         return RegionAtlas.learned(n_groups, traits, centres, alike=len(found) == 1)
 
@@ -162,16 +164,25 @@ class Labeller:
         """(p,) side of each polygon, given the segments: see `PoseSegmentation.polygon_sides`."""
         voters = sorted(set(np.linspace(0, len(works) - 1, VOTERS).round().astype(int).tolist()))
         given: list[IntArray] = []
+
+        def tick(done: float) -> None:
+            if progress:
+                progress(done / len(voters))
+
         for alike in _together([works[i] for i in voters]):
-            regions = self._regions(atlas.n_groups, alike, self._least_share)
-            names = atlas.named(mean_traits([self._traits(regions, work) for work in alike]))
+            begun = len(given)
+
+            def cleaning(share: float, begun: int = begun, count: int = len(alike)) -> None:
+                tick(begun + CLEANED * share * count)
+
+            regions = self._regions(atlas.n_groups, alike, self._least_share, cleaning)
+            names = atlas.named(mean_traits([self._traits(regions, work, len(alike)) for work in alike]))
             of_faces = atlas.sides_of(regions.numbered(names, len(atlas.side)))
-            for work in alike:
+            for i, work in enumerate(alike):
                 polygon_of = polygons[voters[len(given)]]
                 field = _kept_side_field(work, regions, atlas, of_faces)
                 given.append(_sides_seen_in(work, field, polygon_of, labels))
-                if progress:
-                    progress(len(given) / len(voters))
+                tick(begun + CLEANED * len(alike) + (1 - CLEANED) * (i + 1))
         # Half left and half neither is neither.
         return np.trunc(np.median(given, axis=0)).astype(np.int64)
 
@@ -195,12 +206,12 @@ class Labeller:
 
         poses = (work.pose for work in works)
         made_from = self.mixture, self.grouping, n_groups, self.length, least_share, *poses
-        return works[0].memo.get("regions", made_from, found)
+        return works[0].memo.get(f"regions in {len(works)}", made_from, found)
 
-    def _traits(self, regions: Regions, work: Workpiece) -> Traits:
-        """What tells regions apart in a pose."""
+    def _traits(self, regions: Regions, work: Workpiece, n_poses: int) -> Traits:
+        """What tells regions, found in so many poses together, apart in one of them."""
         fields = work.memo.get("fields", (self.mixture,), lambda: self._fields(work))
-        return work.memo.get("traits", (regions, fields), lambda: regions.traits(work, fields))
+        return work.memo.get(f"traits of {n_poses}", (regions, fields), lambda: regions.traits(work, fields))
 
     def _fields(self, work: Workpiece) -> FloatArray:
         """(n', FIELDS) the signature along the axes on which the components lie farthest apart."""

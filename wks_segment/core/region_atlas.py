@@ -51,8 +51,6 @@ BENT = 0.1
 """The same where no mirroring brings the regions close to each other."""
 SIDE_REACH = 0.15
 """What `REACH` is, where a part's side is that of what is near to it."""
-VOTERS = 5
-"""Poses of a mesh that say which of its parts are left and right; more would not say it more surely."""
 SURE = 0.5
 """A part is left or right from this mean of `side_field` on: heat from one side is three times that from the other."""
 

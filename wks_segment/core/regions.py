@@ -108,7 +108,7 @@ def merge_crumbs(
     least = min_share * areas.sum()
     largest = np.zeros(int(labels.max()) + 2)
     np.maximum.at(largest, label_of + 1, size)
-    needed = np.maximum(least, least_of_largest * largest[label_of + 1])
+    stray = size < least_of_largest * largest[label_of + 1]
 
     borders = _border_lengths(region, adjacency)
     owner = np.arange(count)
@@ -120,8 +120,8 @@ def merge_crumbs(
         return i
 
     for crumb in np.argsort(size, kind="stable"):
-        # A crumb may have grown by smaller ones before its turn.
-        if owner[crumb] != crumb or size[crumb] >= needed[crumb]:
+        # A crumb may have grown by smaller ones before its turn; what is stray remains so.
+        if owner[crumb] != crumb or (size[crumb] >= least and not stray[crumb]):
             continue
         shared: dict[int, float] = defaultdict(float)
         for neighbour, length in borders[crumb].items():

@@ -271,7 +271,8 @@ class PoseSegmentation(PoseDescriber):
     def segment_faces(self, mesh: AnyPose, min_share: float | None = None) -> IntArray:
         """(m,) component of each face, cleaned: smooth borders, no connected part under `min_share` of the area.
 
-        `min_share` is 0.005 if not given, and 0 without smoothing.
+        `min_share` is 0.005 if not given, and 0 without smoothing. Unless it is 0, no part is under 15 % of the largest
+        one of its segment either.
         A loose piece that is smaller as a whole takes the label of what is next to it.
         """
         return self._labeller().clean([self._work(mesh)], None, self._least_share(min_share))[0]

@@ -23,9 +23,13 @@ class WKS_SEGMENT_OT_clear(bpy.types.Operator):
         return feedback.in_object_mode(cls, context) and feedback.has_labelled_mesh(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        wholes = {whole for obj in context.selected_objects if (whole := whole_of(obj)) is not None}
+        chosen = selected_meshes(context)
+        names = {obj.name for obj in chosen}
+        wholes = {whole for obj in chosen if (whole := whole_of(obj)) is not None}
         kept = sum(unite(context, whole) for whole in wholes)
-        meshes = {obj.data for obj in selected_meshes(context) if obj.data.library is None}
+        # Pieces are gone now, but for those that were worked on.
+        there = wholes | {obj for obj in context.scene.objects if obj.name in names}
+        meshes = {obj.data for obj in there if obj.data.library is None}
         cleared = sum(clear_labels(mesh) for mesh in meshes)
         context.scene.wks_segment.applied = ""
         segments.fill(context.scene.wks_segment)
