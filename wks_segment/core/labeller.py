@@ -206,12 +206,12 @@ class Labeller:
 
         poses = (work.pose for work in works)
         made_from = self.mixture, self.grouping, n_groups, self.length, least_share, *poses
-        return works[0].memo.get(f"regions in {len(works)}", made_from, found)
+        return works[0].memo.get(("regions", len(works)), made_from, found)
 
     def _traits(self, regions: Regions, work: Workpiece, n_poses: int) -> Traits:
         """What tells regions, found in so many poses together, apart in one of them."""
         fields = work.memo.get("fields", (self.mixture,), lambda: self._fields(work))
-        return work.memo.get(f"traits of {n_poses}", (regions, fields), lambda: regions.traits(work, fields))
+        return work.memo.get(("traits", n_poses), (regions, fields), lambda: regions.traits(work, fields))
 
     def _fields(self, work: Workpiece) -> FloatArray:
         """(n', FIELDS) the signature along the axes on which the components lie farthest apart."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -23,9 +23,9 @@ class Memo:
     """Results by name, each with what it was made from; made again where that is something else."""
 
     def __init__(self) -> None:
-        self._kept: dict[str, tuple[tuple[Any, ...], Any]] = {}
+        self._kept: dict[Hashable, tuple[tuple[Any, ...], Any]] = {}
 
-    def get(self, name: str, made_from: tuple[Any, ...], make: Callable[[], T]) -> T:
+    def get(self, name: Hashable, made_from: tuple[Any, ...], make: Callable[[], T]) -> T:
         """A result; made if there is none, or it is from other objects or numbers."""
         if name not in self._kept or not _same(self._kept[name][0], made_from):
             self._kept[name] = made_from, make()
