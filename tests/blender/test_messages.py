@@ -34,7 +34,7 @@ NOT_SHOWN = {
     "Names of the objects that were ranked, as JSON", "Row of the model whose text is below",
     "The model in use, as JSON", "What the labels in this scene are from, see `Session`",
     # What the code says to itself, or to other code.
-    "OBJECT EDIT_MESH", "settings = bpy.context.scene.wks_segment", "nothing fits", "work …", "mean …", "posed …",
+    "OBJECT EDIT_MESH", "settings = bpy.context.scene.wks_segment", "nothing fits", "work …",
     r"^MemAvailable:\s+(\d+) kB", r"(?<=\d) (?=\d|(of|von) \d)|((?<=\d of)|(?<=\d von)) (?=\d)",
     "TriangleMesh(… vertices, … faces)", "wks_segment model",
     # Then the fast eigensolver gives way to the exact one.

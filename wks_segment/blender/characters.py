@@ -128,8 +128,9 @@ def with_rigged(selected: Iterable[bpy.types.Object], visible: Iterable[bpy.type
     """The selected mesh objects, and those of the visible ones that a selected armature stands for."""
     selected = list(selected)
     chosen = [obj for obj in selected if obj.type == "MESH"]
-    rigs = {obj for obj in selected if obj.type == "ARMATURE"} - {armature_of(obj) for obj in chosen}
+    rigs = {obj for obj in selected if obj.type == "ARMATURE"}
     if rigs:
+        rigs -= {armature_of(obj) for obj in chosen}
         chosen += [obj for obj in visible if obj.type == "MESH" and armature_of(obj) in rigs]
     return chosen
 

@@ -40,7 +40,7 @@ from .style import Style
 from .weights import by_parts, soft_weights
 
 CUT = 0.6
-"""Share of the time that labels take, the rest is telling left from right."""
+"""Share of the time that labels take where left is told from right, too."""
 
 
 @dataclass(frozen=True)
@@ -187,6 +187,7 @@ def label(
     """Part of each of a character's polygons, agreed on by all of its poses, and by all objects that share a mesh."""
     labels: dict[Character, IntArray] = {}
     min_share = None if model.preset == "paper" else wanted.min_share
+    cut = CUT if wanted.sides == "two" else 1.0
     with report.stage("label"):
         together = of_one_mesh(poses)
         for number, mine in enumerate(together):
@@ -194,7 +195,7 @@ def label(
             body = wanted.bodies[character]
 
             def of_pose(share: float, number: int = number, name: str = character.name) -> None:
-                progress(f'Labels of "{name}"', (number + CUT * share) / len(together))
+                progress(f'Labels of "{name}"', (number + cut * share) / len(together))
 
             found = model.segment_polygons(
                 [described[i] for i in mine],
@@ -209,7 +210,7 @@ def label(
                     [poses[i].polygon_of for i in mine],
                     found,
                     lambda share, number=number, name=character.name: progress(
-                        f'Left and right of "{name}"', (number + CUT + (1 - CUT) * share) / len(together)
+                        f'Left and right of "{name}"', (number + cut + (1 - cut) * share) / len(together)
                     ),
                 )
                 found = parts.numbered(found, sides)

@@ -99,14 +99,14 @@ class Labeller:
     ) -> tuple[IntArray, FaceAdjacency]:
         """Segments, or with `n_groups` what regions are parts of; of polygons (None: triangles). See `PosedMesh`."""
         # What poses of one mesh have in common is kept with the first.
-        kind, memo = f"{len(works)} {'faces' if polygons is None else 'polygons'}", works[0].memo
+        kind, memo = ("faces" if polygons is None else "polygons", len(works)), works[0].memo
         posed = memo.get(
-            f"posed {kind}", (*(work.pose for work in works), *(polygons or ())), lambda: PosedMesh(works, polygons)
+            ("posed", *kind), (*(work.pose for work in works), *(polygons or ())), lambda: PosedMesh(works, polygons)
         )
         joined = n_groups or self.n_segments
         if self._keeps(max(posed.n_polygons, *(len(work.pose.signature) for work in works))):
             of_components = memo.get(
-                f"mean {kind}",
+                ("mean", *kind),
                 (posed, self.mixture, self.length),
                 lambda: posed.mean(works, lambda work: self.smoothed(work, None), progress),
             )
@@ -143,7 +143,7 @@ class Labeller:
             def cleaning(share: float, begun: int = len(traits), count: int = len(alike)) -> None:
                 tick((begun + CLEANED * share * count) / len(works))
 
-            regions = self._regions(n_groups, alike, self._least_share, cleaning)
+            regions = self._regions(n_groups, alike, self.least_share, cleaning)
             found.append(regions)
             begun = len(traits)
             for i, work in enumerate(alike):
@@ -175,7 +175,7 @@ class Labeller:
             def cleaning(share: float, begun: int = begun, count: int = len(alike)) -> None:
                 tick(begun + CLEANED * share * count)
 
-            regions = self._regions(atlas.n_groups, alike, self._least_share, cleaning)
+            regions = self._regions(atlas.n_groups, alike, self.least_share, cleaning)
             names = atlas.named(mean_traits([self._traits(regions, work, len(alike)) for work in alike]))
             of_faces = atlas.sides_of(regions.numbered(names, len(atlas.side)))
             for i, work in enumerate(alike):
@@ -187,8 +187,8 @@ class Labeller:
         return np.trunc(np.median(given, axis=0)).astype(np.int64)
 
     @property
-    def _least_share(self) -> float:
-        """Smallest region that is learned, or that says what is left and right."""
+    def least_share(self) -> float:
+        """Smallest part where nothing is said of it, as a share of the area."""
         return MIN_SHARE if self.length > 0 else 0.0
 
     def _regions(

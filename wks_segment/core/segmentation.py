@@ -23,7 +23,7 @@ from .intrinsic import Laplacian
 from .labeller import Labeller
 from .laplacian import unit_area_masses
 from .layout import SMOOTHING_LENGTH
-from .learning import AUTO, MIN_SHARE, Candidates, Plan
+from .learning import AUTO, Candidates, Plan
 from .mesh import FloatArray, IntArray, TriangleMesh
 from .mixture import CovarianceType, GaussianMixture, drawn_evenly, fit_mixtures
 from .part_notes import PartNotes
@@ -503,7 +503,7 @@ class PoseSegmentation(PoseDescriber):
     def _least_share(self, min_share: float | None) -> float:
         """Smallest part, as a share of the area; ValueError if it is none."""
         if min_share is None:
-            return MIN_SHARE if self._setting("smoothness") > 0 else 0.0
+            return self._labeller().least_share
         if not 0 <= min_share < 1:
             raise ValueError(f"min_share must be from 0 to below 1, not {min_share!r}")
         return min_share
