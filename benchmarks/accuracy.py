@@ -19,8 +19,8 @@ from threadpoolctl import threadpool_limits
 from benchmarks.solvers import N_PAIRS
 from benchmarks.speed import labeller, table_row
 from wks_segment.core import TriangleMesh, eigenpairs, prepare_surface, wave_kernel_signature
-from wks_segment.core.description import VERTICES_PER_PAIR
-from wks_segment.core.signature import wave_kernel_signature_of
+from wks_segment.core.poses.describe import VERTICES_PER_PAIR
+from wks_segment.core.spectral.signature import wave_kernel_signature_of
 
 LIMIT = 0.7
 """Error of the signature, in per cent, that counts as too large."""

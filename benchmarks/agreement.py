@@ -12,7 +12,7 @@ from scipy.sparse import coo_matrix
 from sklearn.metrics import adjusted_rand_score
 
 from wks_segment.core import PoseSegmentation, PoseSignature
-from wks_segment.core.mesh import IntArray
+from wks_segment.core.mesh.triangle_mesh import IntArray
 
 
 @dataclass(frozen=True)

@@ -153,13 +153,13 @@ def cached(characters: list[Path], output: Path) -> None:
     import bpy
 
     import wks_segment.blender
-    from wks_segment.blender import tasks
-    from wks_segment.blender.characters import mesh_objects
-    from wks_segment.blender.commands.common import characters_in
-    from wks_segment.blender.files import open_files
-    from wks_segment.blender.poses import own_frames, read_frames
-    from wks_segment.blender.report import Report
-    from wks_segment.blender.terminal import only_result_on_stdout
+    from wks_segment.blender.cli.commands.common import characters_in
+    from wks_segment.blender.cli.terminal import only_result_on_stdout
+    from wks_segment.blender.scene.characters import mesh_objects
+    from wks_segment.blender.scene.file_formats import open_files
+    from wks_segment.blender.scene.poses import own_frames, read_frames
+    from wks_segment.blender.workflow import pipeline
+    from wks_segment.blender.workflow.report import Report
     from wks_segment.core import DiskCache, PoseSegmentation
 
     wks_segment.blender.register()
@@ -177,7 +177,7 @@ def cached(characters: list[Path], output: Path) -> None:
         for number in (FIRST, SECOND):
             begun = time.monotonic()
             model = PoseSegmentation(n_segments=int(number))
-            tasks.learn(model, poses, Report([]), lambda stage, share: None, cache)
+            pipeline.learn(model, poses, Report([]), lambda stage, share: None, cache)
             seconds.append(time.monotonic() - begun)
         shares.append(seconds[1] / seconds[0])
         print(table_row([path.stem, *(f"{each:.2f}" for each in seconds), f"{shares[-1]:.3f}"]), flush=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.makehuman import MakeHuman
-from wks_segment.core.mesh import FloatArray
+from wks_segment.core.mesh.triangle_mesh import FloatArray
 
 MOST = 1.2
 """How many times as long or thick as MakeHuman's a part can be, or the other way round."""

@@ -19,11 +19,11 @@ import bpy
 
 import wks_segment.blender
 from benchmarks import shapes
-from wks_segment.blender import tasks
-from wks_segment.blender.report import Report
-from wks_segment.blender.tasks import Wanted
-from wks_segment.blender.training import read_training_poses
-from wks_segment.core import description
+from wks_segment.blender.scene.pose_sources import read_training_poses
+from wks_segment.blender.workflow import pipeline
+from wks_segment.blender.workflow.pipeline import Wanted
+from wks_segment.blender.workflow.report import Report
+from wks_segment.core.poses import describe
 
 
 def main() -> None:
@@ -34,7 +34,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, help="poses solved side by side")
     options = parser.parse_args()
     if options.workers:
-        description.MAX_WORKERS = options.workers
+        describe.MAX_WORKERS = options.workers
     bpy.ops.wm.read_homefile(use_empty=True)
     wks_segment.blender.register()
     try:
@@ -76,11 +76,11 @@ def run() -> dict[str, dict[str, float]]:
 
     model = settings.new_model()
     poses = timed("read", lambda: read_training_poses(bpy.context, settings, report))
-    described = timed("connect, eigenpairs, signature", lambda: tasks.describe(model, poses, report, quiet))
+    described = timed("connect, eigenpairs, signature", lambda: pipeline.describe(model, poses, report, quiet))
     timed("mixture", lambda: model.fit(described))
     wanted = timed("read meshes", lambda: Wanted.of(settings, (pose.character for pose in poses)))
-    labels = timed("label", lambda: tasks.label(model, poses, described, wanted, report, quiet))
-    timed("write", lambda: tasks.write(settings, labels, wanted, report))
+    labels = timed("label", lambda: pipeline.label(model, poses, described, wanted, report, quiet))
+    timed("write", lambda: pipeline.write(settings, labels, wanted, report))
     return stages
 
 

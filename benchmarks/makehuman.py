@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from wks_segment.core import TriangleMesh
-from wks_segment.core.mesh import FloatArray, IntArray
+from wks_segment.core.mesh.triangle_mesh import FloatArray, IntArray
 
 BEND = {
     "upperarm01": 50, "lowerarm01": 60, "wrist": 25, "upperleg01": 40, "lowerleg01": 55, "foot": 20, "finger": 30,

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from wks_segment.core import TriangleMesh
-from wks_segment.core.mesh import FloatArray, IntArray, unique_edges
-from wks_segment.core.refine import cut
+from wks_segment.core.mesh.subdivision import cut
+from wks_segment.core.mesh.triangle_mesh import FloatArray, IntArray, unique_edges
 
 Perturbed = tuple[TriangleMesh, IntArray]
 

@@ -32,7 +32,7 @@ from benchmarks import agreement, characters, makehuman, perturbations, retrieva
 from benchmarks.bodies import other_body
 from benchmarks.speed import table_row
 from wks_segment.core import PoseSegmentation, PoseSignature, TriangleMesh, connect
-from wks_segment.core.mesh import FloatArray, IntArray
+from wks_segment.core.mesh.triangle_mesh import FloatArray, IntArray
 
 PRESETS = ("default", "paper")
 CLASSES = {"human": 1, "chair": 101, "octopus": 121, "plier": 201, "fish": 221}
@@ -306,8 +306,8 @@ def _pairs_row(what: str, preset: str, labels: Sequence[IntArray]) -> str:
 
 def _picture(shapes: Sequence[tuple[str, PoseSignature, IntArray]], path: Path) -> None:
     """Shapes in the colours of their faces' labels, from y upwards turned to Blender's z upwards."""
-    from wks_segment.blender.picture import Tile, render_poses
-    from wks_segment.blender.poses import Pose
+    from wks_segment.blender.render.contact_sheet import Tile, render_poses
+    from wks_segment.blender.scene.poses import Pose
 
     tiles = []
     for name, shape, labels in shapes:

@@ -19,11 +19,12 @@ from scipy.sparse import coo_matrix
 
 import wks_segment.blender
 from benchmarks.speed import table_row
-from wks_segment.blender import files, tasks
-from wks_segment.blender.report import Report
-from wks_segment.blender.training import read_training_poses
+from wks_segment.blender.scene import file_formats
+from wks_segment.blender.scene.pose_sources import read_training_poses
+from wks_segment.blender.workflow import pipeline
+from wks_segment.blender.workflow.report import Report
 from wks_segment.core import PoseSegmentation
-from wks_segment.core.mesh import FloatArray, IntArray
+from wks_segment.core.mesh.triangle_mesh import FloatArray, IntArray
 
 NUMBERS = (4, 6, 10, 12, 16)
 
@@ -51,14 +52,14 @@ def main() -> None:
 
 def agreements(path: Path) -> list[float]:
     """Of the regrouped with the fresh model, for each number."""
-    (objects,) = files.open_files([path])
+    (objects,) = file_formats.open_files([path])
     for obj in objects:
         obj.select_set(obj.type == "MESH")
     settings, report = bpy.context.scene.wks_segment, Report([])
     poses = read_training_poses(bpy.context, settings, report)
     polygons, rest = [pose.polygon_of for pose in poses], poses[0].upright
     eight = settings.new_model()
-    described = tasks.describe(eight, poses, report, lambda stage, share: None)
+    described = pipeline.describe(eight, poses, report, lambda stage, share: None)
     eight.fit(described, rest=rest)
     areas = np.bincount(polygons[0], poses[0].mesh.face_areas).astype(np.float64)
     found = []

@@ -48,7 +48,7 @@ def of_characters(folder: Path, output: Path) -> Retrieval:
 
 def picture(found: Retrieval, path: Path) -> None:
     """Write the confusion matrix as a picture."""
-    from wks_segment.blender.matrix_picture import render_matrix
+    from wks_segment.blender.render.confusion_matrix import render_matrix
 
     render_matrix(found, path)
     print(f"\npicture: {path}", flush=True)

@@ -18,7 +18,7 @@ from benchmarks import makehuman
 from benchmarks.perturbations import PERTURBATIONS, Perturbation
 from benchmarks.speed import table_row
 from wks_segment.core import PoseSegmentation, TriangleMesh
-from wks_segment.core.mesh import IntArray
+from wks_segment.core.mesh.triangle_mesh import IntArray
 
 LEARNED, TESTED = (1, 2, 3, 4), (5, 6)
 """Seeds of the poses."""

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from wks_segment.core import TriangleMesh
-from wks_segment.core.mesh import FloatArray
+from wks_segment.core.mesh.triangle_mesh import FloatArray
 
 LIMBS = (
     ((1.0, 0.1, 0.2), 3.0, 0.35),

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from wks_segment.core import TriangleMesh, eigenpairs, mass_matrix, stiffness_matrix, wave_kernel_signature
-from wks_segment.core.mesh import FloatArray
-from wks_segment.core.signature import wave_kernel_signature_of
-from wks_segment.core.spectrum import eigenpair_panels
+from wks_segment.core.mesh.triangle_mesh import FloatArray
+from wks_segment.core.spectral.eigenpairs import eigenpair_panels
+from wks_segment.core.spectral.signature import wave_kernel_signature_of
 
 N_PAIRS = 300
 METHODS = ("eigsh", "lapy", "fast", "exact")

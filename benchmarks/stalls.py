@@ -20,8 +20,8 @@ import bpy
 
 import wks_segment.blender
 from benchmarks import shapes
-from wks_segment.blender.jobs import Job
-from wks_segment.blender.work import Work
+from wks_segment.blender.workflow.background_job import Job
+from wks_segment.blender.workflow.segmentation_job import Work
 
 MOMENT = 0.02
 """Seconds between two looks."""

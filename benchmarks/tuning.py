@@ -23,10 +23,10 @@ import bpy
 import wks_segment.blender
 from benchmarks import shapes
 from benchmarks.speed import table_row
-from wks_segment.blender import files
-from wks_segment.blender.session import session_of
+from wks_segment.blender.scene import file_formats
+from wks_segment.blender.workflow.live_session import session_of
 from wks_segment.core import PoseSegmentation
-from wks_segment.core.posed_mesh import PosedMesh
+from wks_segment.core.labeling.polygons import PosedMesh
 
 CHANGES: list[tuple[str, dict[str, Any]]] = [
     ("12 segments", {"n_segments": 12}),
@@ -89,7 +89,7 @@ def main() -> None:
     code = 1
     try:
         if options.file:
-            (objects,) = files.open_files([options.file])
+            (objects,) = file_formats.open_files([options.file])
             for obj in objects:
                 obj.select_set(obj.type == "MESH")
         else:

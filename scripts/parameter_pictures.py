@@ -22,11 +22,12 @@ from mathutils import Matrix, Vector
 from PIL import Image
 
 import wks_segment.blender
-from wks_segment.blender import demo, poses
-from wks_segment.blender.characters import Character
-from wks_segment.blender.labels import FACES
-from wks_segment.blender.picture import Tile, render_poses
-from wks_segment.core.mesh import IntArray
+from wks_segment.blender.cli import demo_scene
+from wks_segment.blender.outputs.labels import FACES
+from wks_segment.blender.render.contact_sheet import Tile, render_poses
+from wks_segment.blender.scene import poses
+from wks_segment.blender.scene.characters import Character
+from wks_segment.core.mesh.triangle_mesh import IntArray
 
 FOLDER = Path(__file__).resolve().parent.parent / "docs" / "images"
 WIDTH = 340
@@ -51,7 +52,7 @@ class Sheet(NamedTuple):
 
 def creature() -> Character:
     """The creature of the demo."""
-    character = demo.creature(bpy.context)
+    character = demo_scene.creature(bpy.context)
     settings = bpy.context.scene.wks_segment
     settings.source, settings.pose_count = "FRAMES", 4
     bpy.context.scene.frame_set(FRAME)

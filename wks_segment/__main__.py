@@ -16,10 +16,11 @@ def main() -> None:
             "wks_segment: this command needs Blender's Python module: pip install bpy, or blender --command wks_segment"
         )
     from . import blender
+    from .blender.cli.main import run
 
     blender.register()
     try:
-        code = blender.commands.run(sys.argv[1:])
+        code = run(sys.argv[1:])
     except SystemExit as end:  # argparse
         code = int(end.code or 0)
     except BaseException:

@@ -9,7 +9,7 @@ import sys
 import time
 from pathlib import Path
 
-CHILD = Path(__file__).resolve().parents[2] / "wks_segment" / "batch" / "child.py"
+CHILD = Path(__file__).resolve().parents[2] / "wks_segment" / "batch" / "worker_main.py"
 spec = importlib.util.spec_from_file_location("child", CHILD)
 child = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(child)

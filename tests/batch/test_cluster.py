@@ -83,7 +83,7 @@ def test_a_scheduler_that_is_not_there_is_named(batch, monkeypatch):
 
 
 def test_without_dask_it_is_said_what_to_install(batch, monkeypatch):
-    monkeypatch.setattr("wks_segment.batch.run.find_spec", lambda name: None)
+    monkeypatch.setattr("wks_segment.batch.batch_run.find_spec", lambda name: None)
     with pytest.raises(BatchError, match=r"--scheduler needs Dask.*pip install"):
         batch({"a": "one"}, scheduler="tcp://127.0.0.1:9").run(quiet)
 

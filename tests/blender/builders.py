@@ -7,7 +7,7 @@ import bmesh
 import bpy
 import numpy as np
 
-from wks_segment.blender.labels import NOTE, has_labels
+from wks_segment.blender.outputs.labels import NOTE, has_labels
 
 LIMBS = np.array([[1.0, 0.0, 0.2], [-0.5, 0.8, 0.1], [-0.4, -0.7, -0.5]])
 """Directions of the three limbs of the test character."""

@@ -22,7 +22,8 @@ os.environ["BLENDER_USER_RESOURCES"] = RESOURCES
 os.environ["OMP_NUM_THREADS"] = "1"
 HAS_BPY = importlib.util.find_spec("bpy") is not None
 if not HAS_BPY:
-    collect_ignore = [path.name for path in Path(__file__).parent.glob("test_*.py") if "zip" not in path.name]
+    HERE = Path(__file__).parent
+    collect_ignore = [str(p.relative_to(HERE)) for p in HERE.rglob("test_*.py") if "zip" not in p.name]
 LIBC = ctypes.cdll.msvcrt if os.name == "nt" else ctypes.CDLL(None)
 STDOUT = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115  # importers keep it
 """Writes to descriptor 1, as sys.stdout of a real process does and pytest's does not."""
@@ -67,7 +68,9 @@ def scene(extension):
     import bpy
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    extension.session.session_of(bpy.context).cache.clear()
+    from wks_segment.blender.workflow.live_session import session_of
+
+    session_of(bpy.context).cache.clear()
     settings = bpy.context.scene.wks_segment
     settings.source = "OBJECTS"
     settings.n_segments, settings.n_eigenpairs, settings.n_energies = 4, 30, 40
@@ -96,11 +99,13 @@ def command(scene, extension, printed):
     """A function that runs the command line in this process."""
     from builders import Outcome
 
+    from wks_segment.blender.cli.main import run as run_command
+
     def run(*arguments):
         printed()
         with contextlib.redirect_stdout(STDOUT):
             try:
-                code = extension.commands.run([str(argument) for argument in arguments])
+                code = run_command([str(argument) for argument in arguments])
             except SystemExit as end:
                 code = end.code
             STDOUT.flush()

@@ -7,8 +7,8 @@ import pytest
 from shapes import creature, icosphere
 
 from wks_segment.core import PoseSegmentation, TriangleMesh, described_alike, rank, retrieve
-from wks_segment.core.explained import left_out_likelihoods, likely_mean
-from wks_segment.core.mixture import fit_mixture
+from wks_segment.core.learning.gaussian_mixture import fit_mixture
+from wks_segment.core.learning.likelihood import left_out_likelihoods, likely_mean
 from wks_segment.core.model_file import ModelFileError
 from wks_segment.core.ranking import least_usual, ranking_of, spread_evenly
 

@@ -3,7 +3,7 @@ import pytest
 from shapes import creature, icosphere, split_at_every_corner, together
 
 from wks_segment.core import PoseSegmentation, TriangleMesh, prepare_surface
-from wks_segment.core.regions import FaceAdjacency, connected_regions
+from wks_segment.core.mesh.adjacency import FaceAdjacency, connected_regions
 
 SMALL = {"n_segments": 4, "n_eigenpairs": 60}
 POSES = [creature(bend) for bend in (0.0, 0.4, 0.8)]

@@ -16,7 +16,7 @@ ADDON = "bl_ext.user_default.wks_segment"
 def creature():
     """The creature in the middle of the view; its bones are hidden, as riggers do."""
     scene = bpy.context.scene
-    maker = importlib.import_module(f"{ADDON}.wks_segment.blender.creature")
+    maker = importlib.import_module(f"{ADDON}.wks_segment.blender.cli.creature")
     scene.frame_start, scene.frame_end = maker.FIRST_FRAME, maker.LAST_FRAME
     body = maker.build_creature(scene)
     body.parent.hide_set(True)

@@ -3,13 +3,13 @@
 The children run the command line of `wks_segment.blender`, which is all that this room knows of it.
 """
 
-from .child import Answer, serve
+from .batch_run import Batch, merged
 from .errors import BatchError
 from .inputs import inputs_of, names_of
 from .job import Job, Outcome, content_of, key_of
 from .limits import Limits
-from .process import COMMAND, Program, python_program
-from .run import Batch, merged
+from .worker_main import Answer, serve
+from .worker_process import COMMAND, Program, python_program
 
 __all__ = [
     "COMMAND",

@@ -17,8 +17,8 @@ from distributed import Client, KilledWorker, Worker, WorkerPlugin, as_completed
 from .errors import BatchError, EndedError
 from .job import Job, Outcome
 from .limits import Limits
-from .process import Child, python_program
-from .work import do
+from .run_job import do
+from .worker_process import Child, python_program
 
 CONNECT_SECONDS = 10
 RETRIES = 2

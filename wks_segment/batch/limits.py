@@ -7,7 +7,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..core.memory import available_memory
+from ..core.spectral.memory import available_memory
 
 OF_FREE = 0.9
 """Share of the memory that is free at first which a child may take, if nothing else is said: before the system has to

@@ -10,10 +10,10 @@ from typing import Any, get_args
 
 import numpy as np
 
-from .mesh import FloatArray, IntArray
-from .mixture import CovarianceType
-from .part_notes import PartNotes
-from .region_atlas import FIELDS, PLANES
+from .labeling.region_atlas import FIELDS, PLANES
+from .learning.gaussian_mixture import CovarianceType
+from .mesh.triangle_mesh import FloatArray, IntArray
+from .user_labels import PartNotes
 
 FORMAT = "wks_segment model"
 VERSION = 4

@@ -14,8 +14,8 @@ from typing import Literal
 
 import numpy as np
 
-from .mesh import FloatArray, IntArray
-from .pose_signature import PoseSignature
+from .mesh.triangle_mesh import FloatArray, IntArray
+from .poses.pose_signature import PoseSignature
 from .segmentation import PoseSegmentation
 
 Verdict = Literal["sure", "unsure", "nothing fits"]

@@ -15,24 +15,24 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from . import model_file
-from .cache import Cache
-from .description import PoseDescriber, Progress
-from .explained import left_out_likelihoods, likely_mean
-from .grouping import Grouping
-from .intrinsic import Laplacian
-from .labeller import Labeller
-from .laplacian import unit_area_masses
-from .layout import SMOOTHING_LENGTH
-from .learning import AUTO, Candidates, Plan
-from .mesh import FloatArray, IntArray, TriangleMesh
-from .mixture import CovarianceType, GaussianMixture, drawn_evenly, fit_mixtures
-from .part_notes import PartNotes
-from .pose_signature import PoseSignature
-from .region_atlas import RegionAtlas
-from .regions import connected_regions
-from .spectrum import Accuracy
-from .surface import Pieces
-from .workpiece import Workpiece
+from .labeling.labeler import Labeller
+from .labeling.region_atlas import RegionAtlas
+from .learning.candidates import SMOOTHING_LENGTH
+from .learning.gaussian_mixture import CovarianceType, GaussianMixture, drawn_evenly, fit_mixtures
+from .learning.likelihood import left_out_likelihoods, likely_mean
+from .learning.merge_tree import Grouping
+from .learning.model_selection import AUTO, Candidates, Plan
+from .mesh.adjacency import connected_regions
+from .mesh.surface import Pieces
+from .mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
+from .poses.describe import PoseDescriber, Progress
+from .poses.pose_cache import Workpiece
+from .poses.pose_signature import PoseSignature
+from .poses.signature_cache import Cache
+from .spectral.eigenpairs import Accuracy
+from .spectral.intrinsic_delaunay import Laplacian
+from .spectral.laplacian import unit_area_masses
+from .user_labels import PartNotes
 
 Scaling = Literal["log", "raw"]
 Preset = Literal["default", "paper"]

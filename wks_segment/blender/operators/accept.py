@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 
 from ..errors import UserError
-from ..session import session_of
-from . import feedback
+from ..workflow.live_session import session_of
+from . import _report
 
 
 class WKS_SEGMENT_OT_accept(bpy.types.Operator):
@@ -19,17 +19,17 @@ class WKS_SEGMENT_OT_accept(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return (
-            feedback.shows_preview(cls, context)
-            and feedback.no_job_runs(cls, context)
-            and feedback.in_object_mode(cls, context)
+            _report.shows_preview(cls, context)
+            and _report.no_job_runs(cls, context)
+            and _report.in_object_mode(cls, context)
         )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
             work = session_of(context).update(context.scene)
         except UserError as error:
-            feedback.tell(self, {"ERROR"}, str(error))
+            _report.tell(self, {"ERROR"}, str(error))
             return {"CANCELLED"}
         if work.wanted.colors:
-            feedback.show_colors(context)
-        return feedback.finish(self, "Accepted", work.report)
+            _report.show_colors(context)
+        return _report.finish(self, "Accepted", work.report)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from ..work import Work
-from . import feedback
-from .running import RunsWork
+from ..workflow.segmentation_job import Work
+from . import _report
+from ._base import RunsWork
 
 
 class WKS_SEGMENT_OT_apply(RunsWork, bpy.types.Operator):
@@ -21,12 +21,12 @@ class WKS_SEGMENT_OT_apply(RunsWork, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if not context.scene.wks_segment.model:
-            feedback.explain(cls, "No model yet: use Learn and Segment, or import a model")
+            _report.explain(cls, "No model yet: use Learn and Segment, or import a model")
             return False
         return (
-            feedback.no_job_runs(cls, context)
-            and feedback.in_object_mode(cls, context)
-            and feedback.has_selected_mesh(cls, context)
+            _report.no_job_runs(cls, context)
+            and _report.in_object_mode(cls, context)
+            and _report.has_selected_mesh(cls, context)
         )
 
     def read(self, context: bpy.types.Context) -> Work:

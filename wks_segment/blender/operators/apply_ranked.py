@@ -7,12 +7,12 @@ from pathlib import Path
 import bpy
 from bpy.props import IntProperty
 
-from .. import models
 from ..errors import UserError
-from ..ranking import ranked_objects
-from ..work import Work
-from . import feedback
-from .running import RunsWork
+from ..workflow import model_library
+from ..workflow.model_ranking import ranked_objects
+from ..workflow.segmentation_job import Work
+from . import _report
+from ._base import RunsWork
 
 
 class WKS_SEGMENT_OT_apply_ranked(RunsWork, bpy.types.Operator):
@@ -30,9 +30,9 @@ class WKS_SEGMENT_OT_apply_ranked(RunsWork, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if not context.scene.wks_segment.ranking:
-            feedback.explain(cls, "No ranking yet: use Rank Models")
+            _report.explain(cls, "No ranking yet: use Rank Models")
             return False
-        return feedback.no_job_runs(cls, context) and feedback.in_object_mode(cls, context)
+        return _report.no_job_runs(cls, context) and _report.in_object_mode(cls, context)
 
     def read(self, context: bpy.types.Context) -> Work:
         """Read the character, the model and settings."""
@@ -40,10 +40,10 @@ class WKS_SEGMENT_OT_apply_ranked(RunsWork, bpy.types.Operator):
         if self.index >= len(settings.ranking):
             raise UserError(f"The ranking has only {len(settings.ranking)} models")
         item = settings.ranking[self.index]
-        texts = dict(models.all_of(settings))
+        texts = dict(model_library.all_of(settings))
         if not item.path and item.name not in texts:
             raise UserError(f'There is no model named "{item.name}" any more: rank anew')
-        model = models.loaded(Path(item.path)) if item.path else models.from_text(texts[item.name])
+        model = model_library.loaded(Path(item.path)) if item.path else model_library.from_text(texts[item.name])
         return Work.applying(context, model, ranked_objects(context))
 
     def written(self, context: bpy.types.Context) -> set[str]:
@@ -52,11 +52,11 @@ class WKS_SEGMENT_OT_apply_ranked(RunsWork, bpy.types.Operator):
         settings = self.work.watch.scene().wks_segment
         item = settings.ranking[self.index]
         if not item.path:
-            models.use(settings, settings.models.find(item.name))
+            model_library.use(settings, settings.models.find(item.name))
         else:
             path = Path(item.path)
             summary = [f"From {path.name}", f"{self.work.model.n_segments_} segments"]
-            models.add(settings, self.work.model, item.name, summary)
+            model_library.add(settings, self.work.model, item.name, summary)
             # It is in the scene from now on.
             item.name, item.path = settings.models[settings.used_model].name, ""
         return super().written(context)

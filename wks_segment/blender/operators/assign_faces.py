@@ -6,9 +6,9 @@ import bpy
 import numpy as np
 from bpy.props import StringProperty
 
-from .. import segments
-from ..edits import by_hand, keep_by_hand, values
-from . import feedback
+from ..outputs.overrides import by_hand, keep_by_hand, values
+from ..workflow import segment_list
+from . import _report
 
 
 class WKS_SEGMENT_OT_assign_faces(bpy.types.Operator):
@@ -20,10 +20,10 @@ class WKS_SEGMENT_OT_assign_faces(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return feedback.has_segments(cls, context, "EDIT_MESH")
+        return _report.has_segments(cls, context, "EDIT_MESH")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        return _assign(self, context, segments.active_part(context.scene.wks_segment))
+        return _assign(self, context, segment_list.active_part(context.scene.wks_segment))
 
 
 class WKS_SEGMENT_OT_new_segment(bpy.types.Operator):
@@ -39,7 +39,7 @@ class WKS_SEGMENT_OT_new_segment(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return feedback.has_segments(cls, context, "EDIT_MESH")
+        return _report.has_segments(cls, context, "EDIT_MESH")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         return _assign(self, context, None)
@@ -54,25 +54,25 @@ class WKS_SEGMENT_OT_forget_faces(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not feedback.has_segments(cls, context):
+        if not _report.has_segments(cls, context):
             return False
         if not context.scene.wks_segment.faces_by_hand:
-            feedback.explain(cls, "No face was assigned by hand")
+            _report.explain(cls, "No face was assigned by hand")
             return False
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
         chosen_only = context.mode == "EDIT_MESH"
-        objects, count = segments.labelled(settings), 0
-        with segments.object_mode(context):
-            for mesh in segments.meshes_of(objects):
+        objects, count = segment_list.labelled(settings), 0
+        with segment_list.object_mode(context):
+            for mesh in segment_list.meshes_of(objects):
                 given = by_hand(mesh)
                 forgotten = (given >= 0) & (values(mesh.polygons, "select", bool) | (not chosen_only))
                 count += int(forgotten.sum())
                 keep_by_hand(mesh, np.where(forgotten, -1, given))
-            segments.rewrite_all(settings, objects)
-        feedback.tell(self, {"INFO"}, f"{count} faces are as the model has them")
+            segment_list.rewrite_all(settings, objects)
+        _report.tell(self, {"INFO"}, f"{count} faces are as the model has them")
         return {"FINISHED"}
 
 
@@ -80,19 +80,19 @@ def _assign(operator: bpy.types.Operator, context: bpy.types.Context, part: int 
     """Give the selected faces to a part; None: to a new one."""
     settings = context.scene.wks_segment
     # Faces of objects that are not in Edit Mode can be selected too, unseen.
-    objects = [obj for obj in segments.labelled(settings) if obj.mode == "EDIT"]
-    with segments.object_mode(context):
-        chosen = {mesh: values(mesh.polygons, "select", bool) for mesh in segments.meshes_of(objects)}
+    objects = [obj for obj in segment_list.labelled(settings) if obj.mode == "EDIT"]
+    with segment_list.object_mode(context):
+        chosen = {mesh: values(mesh.polygons, "select", bool) for mesh in segment_list.meshes_of(objects)}
         count = sum(int(selected.sum()) for selected in chosen.values())
         if count:
             if part is None:
-                part = segments.make_part(settings, operator.name)
+                part = segment_list.make_part(settings, operator.name)
             for mesh, selected in chosen.items():
                 keep_by_hand(mesh, np.where(selected, part, by_hand(mesh)))
-            segments.rewrite_all(settings, objects)
-            segments.activate(settings, part)
+            segment_list.rewrite_all(settings, objects)
+            segment_list.activate(settings, part)
     if not count:
-        feedback.tell(operator, {"WARNING"}, "Select some faces of an object that has segments first")
+        _report.tell(operator, {"WARNING"}, "Select some faces of an object that has segments first")
         return {"CANCELLED"}
-    feedback.tell(operator, {"INFO"}, f"{count} faces are of {settings.style().name_of(part)} now")
+    _report.tell(operator, {"INFO"}, f"{count} faces are of {settings.style().name_of(part)} now")
     return {"FINISHED"}

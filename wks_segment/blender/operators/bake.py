@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import bpy
 
-from ..bake import bake_id_maps
-from ..characters import group, selected_meshes
 from ..errors import UserError
-from . import feedback
+from ..outputs.bake import bake_id_maps
+from ..scene.characters import group, selected_meshes
+from . import _report
 
 
 class WKS_SEGMENT_OT_bake(bpy.types.Operator):
@@ -20,9 +20,9 @@ class WKS_SEGMENT_OT_bake(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return (
-            feedback.no_job_runs(cls, context)
-            and feedback.in_object_mode(cls, context)
-            and feedback.has_labelled_mesh(cls, context)
+            _report.no_job_runs(cls, context)
+            and _report.in_object_mode(cls, context)
+            and _report.has_labelled_mesh(cls, context)
         )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -31,14 +31,14 @@ class WKS_SEGMENT_OT_bake(bpy.types.Operator):
         images: list[str] = []
         warnings: list[str] = []
         try:
-            with feedback.cursor_progress(context) as progress:
+            with _report.cursor_progress(context) as progress:
                 for character in group(selected_meshes(context)):
                     baked = bake_id_maps(context, character, settings.style(), size, margin, unwrap, warnings, progress)
                     images += [f'"{id_map.image.name}"' for id_map in baked]
         except UserError as error:
-            feedback.tell(self, {"ERROR"}, str(error))
+            _report.tell(self, {"ERROR"}, str(error))
             return {"CANCELLED"}
-        feedback.tell(self, {"INFO"}, f"Baked {', '.join(images)}: {size} × {size} pixels, kept in this file")
+        _report.tell(self, {"INFO"}, f"Baked {', '.join(images)}: {size} × {size} pixels, kept in this file")
         for warning in warnings:
-            feedback.tell(self, {"WARNING"}, warning)
+            _report.tell(self, {"WARNING"}, warning)
         return {"FINISHED"}

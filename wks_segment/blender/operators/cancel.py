@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..jobs import desk_of
-from . import feedback
+from ..workflow.background_job import desk_of
+from . import _report
 
 
 class WKS_SEGMENT_OT_cancel(bpy.types.Operator):
@@ -18,7 +18,7 @@ class WKS_SEGMENT_OT_cancel(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if desk_of(context).job is None:
-            feedback.explain(cls, "No job is running")
+            _report.explain(cls, "No job is running")
             return False
         return True
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import bpy
 
-from .. import segments
-from ..characters import selected_meshes
-from ..labels import clear_labels, has_labels
-from ..separate import unite, whole_of
-from . import feedback
+from ..outputs.labels import clear_labels, has_labels
+from ..outputs.separate import unite, whole_of
+from ..scene.characters import selected_meshes
+from ..workflow import segment_list
+from . import _report
 
 
 class WKS_SEGMENT_OT_clear(bpy.types.Operator):
@@ -20,7 +20,7 @@ class WKS_SEGMENT_OT_clear(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return feedback.in_object_mode(cls, context) and feedback.has_labelled_mesh(cls, context)
+        return _report.in_object_mode(cls, context) and _report.has_labelled_mesh(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         chosen = selected_meshes(context)
@@ -32,11 +32,11 @@ class WKS_SEGMENT_OT_clear(bpy.types.Operator):
         meshes = {obj.data for obj in there if obj.data.library is None}
         cleared = sum(clear_labels(mesh) for mesh in meshes)
         context.scene.wks_segment.applied = ""
-        segments.fill(context.scene.wks_segment)
+        segment_list.fill(context.scene.wks_segment)
         if not any(has_labels(mesh) for mesh in bpy.data.meshes):
-            feedback.hide_colors(context)
+            _report.hide_colors(context)
         of = "1 mesh" if cleared == 1 else f"{cleared} meshes"
-        feedback.tell(self, {"INFO"}, f"Cleared the segments of {of}")
+        _report.tell(self, {"INFO"}, f"Cleared the segments of {of}")
         if kept:
-            feedback.tell(self, {"WARNING"}, f"{kept} separated objects were worked on since, and stay")
+            _report.tell(self, {"WARNING"}, f"{kept} separated objects were worked on since, and stay")
         return {"FINISHED"}

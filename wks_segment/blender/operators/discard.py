@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..session import session_of
-from . import feedback
+from ..workflow.live_session import session_of
+from . import _report
 
 
 class WKS_SEGMENT_OT_discard(bpy.types.Operator):
@@ -17,7 +17,7 @@ class WKS_SEGMENT_OT_discard(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return feedback.shows_preview(cls, context)
+        return _report.shows_preview(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         session_of(context).discard(context.scene)

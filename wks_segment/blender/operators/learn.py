@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from ..work import Work
-from . import feedback
-from .running import RunsWork
+from ..workflow.segmentation_job import Work
+from . import _report
+from ._base import RunsWork
 
 
 class WKS_SEGMENT_OT_learn(RunsWork, bpy.types.Operator):
@@ -22,9 +22,9 @@ class WKS_SEGMENT_OT_learn(RunsWork, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return (
-            feedback.no_job_runs(cls, context)
-            and feedback.in_object_mode(cls, context)
-            and feedback.has_selected_mesh(cls, context)
+            _report.no_job_runs(cls, context)
+            and _report.in_object_mode(cls, context)
+            and _report.has_selected_mesh(cls, context)
         )
 
     def read(self, context: bpy.types.Context) -> Work:

@@ -9,8 +9,8 @@ from bpy.props import StringProperty
 from bpy_extras.io_utils import ImportHelper
 
 from ...core import ModelFileError, PoseSegmentation
-from .. import models
-from . import feedback
+from ..workflow import model_library
+from . import _report
 
 
 class WKS_SEGMENT_OT_load_model(bpy.types.Operator, ImportHelper):
@@ -28,9 +28,9 @@ class WKS_SEGMENT_OT_load_model(bpy.types.Operator, ImportHelper):
         try:
             model = PoseSegmentation.load(path)
         except (ModelFileError, OSError) as error:
-            feedback.tell(self, {"ERROR"}, f"{path.name} was not loaded: {error}")
+            _report.tell(self, {"ERROR"}, f"{path.name} was not loaded: {error}")
             return {"CANCELLED"}
         summary = [f"From {path.name}", f"{model.n_segments_} segments"]
-        models.add(context.scene.wks_segment, model, path.stem, summary)
-        feedback.tell(self, {"INFO"}, f"Loaded a model of {model.n_segments_} segments from {path.name}")
+        model_library.add(context.scene.wks_segment, model, path.stem, summary)
+        _report.tell(self, {"INFO"}, f"Loaded a model of {model.n_segments_} segments from {path.name}")
         return {"FINISHED"}

@@ -7,8 +7,8 @@ from dataclasses import replace
 import bpy
 from bpy.props import IntProperty
 
-from .. import segments
-from . import feedback
+from ..workflow import segment_list
+from . import _report
 
 
 class WKS_SEGMENT_OT_merge_segments(bpy.types.Operator):
@@ -25,10 +25,10 @@ class WKS_SEGMENT_OT_merge_segments(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not feedback.has_segments(cls, context, "OBJECT"):
+        if not _report.has_segments(cls, context, "OBJECT"):
             return False
         if len(context.scene.wks_segment.segments) < 2:
-            feedback.explain(cls, "There is only one segment")
+            _report.explain(cls, "There is only one segment")
             return False
         return True
 
@@ -40,14 +40,14 @@ class WKS_SEGMENT_OT_merge_segments(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
-        part, into = segments.active_part(settings), self.into
+        part, into = segment_list.active_part(settings), self.into
         if part is None or into == part or into not in [item.number for item in settings.segments]:
-            feedback.tell(self, {"ERROR"}, "Choose another segment of the list to merge the active one with")
+            _report.tell(self, {"ERROR"}, "Choose another segment of the list to merge the active one with")
             return {"CANCELLED"}
         notes, style = settings.notes(), settings.style()
         joined = {other: into if old == part else old for other, old in notes.joined.items()}
         settings.keep_notes(replace(notes, joined=joined | {part: into}))
-        segments.rewrite_all(settings)
-        segments.activate(settings, into)
-        feedback.tell(self, {"INFO"}, f"{style.name_of(part)} is part of {style.name_of(into)} now")
+        segment_list.rewrite_all(settings)
+        segment_list.activate(settings, into)
+        _report.tell(self, {"INFO"}, f"{style.name_of(part)} is part of {style.name_of(into)} now")
         return {"FINISHED"}

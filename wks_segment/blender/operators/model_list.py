@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 from bpy.props import StringProperty
 
-from .. import models
-from . import feedback
+from ..workflow import model_library
+from . import _report
 
 
 class WKS_SEGMENT_OT_use_model(bpy.types.Operator):
@@ -20,17 +20,17 @@ class WKS_SEGMENT_OT_use_model(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return feedback.has_model(cls, context)
+        return _report.has_model(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
-        models.adopt(settings)
+        model_library.adopt(settings)
         index = settings.models.find(self.name)
         if index < 0:
             known = ", ".join(row.name for row in settings.models)
-            feedback.tell(self, {"ERROR"}, f'There is no model named "{self.name}" in the list; there are: {known}')
+            _report.tell(self, {"ERROR"}, f'There is no model named "{self.name}" in the list; there are: {known}')
             return {"CANCELLED"}
-        models.use(settings, index)
+        model_library.use(settings, index)
         return {"FINISHED"}
 
 
@@ -43,10 +43,10 @@ class WKS_SEGMENT_OT_duplicate_model(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return feedback.has_model(cls, context)
+        return _report.has_model(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        models.duplicate(context.scene.wks_segment)
+        model_library.duplicate(context.scene.wks_segment)
         return {"FINISHED"}
 
 
@@ -59,8 +59,8 @@ class WKS_SEGMENT_OT_remove_model(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return feedback.has_model(cls, context)
+        return _report.has_model(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        models.remove(context.scene.wks_segment)
+        model_library.remove(context.scene.wks_segment)
         return {"FINISHED"}

@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 from bpy.props import StringProperty
 
-from .. import segments
-from . import feedback
+from ..workflow import segment_list
+from . import _report
 
 
 class WKS_SEGMENT_OT_name_segment(bpy.types.Operator):
@@ -20,12 +20,12 @@ class WKS_SEGMENT_OT_name_segment(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return feedback.has_segments(cls, context)
+        return _report.has_segments(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
-        part = segments.active_part(settings)
+        part = segment_list.active_part(settings)
         if part is not None:
-            segments.rename(settings, part, self.name)
-            feedback.tell(self, {"INFO"}, f"Named {settings.style().name_of(part)}")
+            segment_list.rename(settings, part, self.name)
+            _report.tell(self, {"INFO"}, f"Named {settings.style().name_of(part)}")
         return {"FINISHED"}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import bpy
 
-from ..preferences import model_folder
-from ..ranking import RankWork
-from . import feedback
-from .running import RunsJob
+from ..props.preferences import model_folder
+from ..workflow.model_ranking import RankWork
+from . import _report
+from ._base import RunsJob
 
 
 class WKS_SEGMENT_OT_rank(RunsJob[RankWork], bpy.types.Operator):
@@ -21,12 +21,12 @@ class WKS_SEGMENT_OT_rank(RunsJob[RankWork], bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         # Not what is in the folder: this is asked whenever the panel is drawn, and the folder may be far away.
         if not (context.scene.wks_segment.model or model_folder(context)):
-            feedback.explain(cls, "No model yet: learn one, import one, or set Model Folder in the preferences")
+            _report.explain(cls, "No model yet: learn one, import one, or set Model Folder in the preferences")
             return False
         return (
-            feedback.no_job_runs(cls, context)
-            and feedback.in_object_mode(cls, context)
-            and feedback.has_selected_mesh(cls, context)
+            _report.no_job_runs(cls, context)
+            and _report.in_object_mode(cls, context)
+            and _report.has_selected_mesh(cls, context)
         )
 
     def read(self, context: bpy.types.Context) -> RankWork:
@@ -35,7 +35,7 @@ class WKS_SEGMENT_OT_rank(RunsJob[RankWork], bpy.types.Operator):
 
     def written(self, context: bpy.types.Context) -> set[str]:
         """Show the ranking and report."""
-        feedback.tell(self, {"INFO"}, self.work.write())
+        _report.tell(self, {"INFO"}, self.work.write())
         for warning in self.work.report.warnings:
-            feedback.tell(self, {"WARNING"}, warning)
+            _report.tell(self, {"WARNING"}, warning)
         return {"FINISHED"}

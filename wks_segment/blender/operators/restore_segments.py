@@ -7,9 +7,9 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from .. import segments
-from ..edits import keep_by_hand
-from . import feedback
+from ..outputs.overrides import keep_by_hand
+from ..workflow import segment_list
+from . import _report
 
 
 class WKS_SEGMENT_OT_restore_segments(bpy.types.Operator):
@@ -21,21 +21,21 @@ class WKS_SEGMENT_OT_restore_segments(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not feedback.has_segments(cls, context, "OBJECT"):
+        if not _report.has_segments(cls, context, "OBJECT"):
             return False
         settings = context.scene.wks_segment
         if not (settings.faces_by_hand or settings.notes().joined):
-            feedback.explain(cls, "The segments are those of the model")
+            _report.explain(cls, "The segments are those of the model")
             return False
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
-        for mesh in segments.meshes_of(segments.labelled(settings)):
+        for mesh in segment_list.meshes_of(segment_list.labelled(settings)):
             keep_by_hand(mesh, np.full(len(mesh.polygons), -1))
         settings.keep_notes(replace(settings.notes(), joined={}))
-        segments.rewrite_all(settings)
-        feedback.tell(self, {"INFO"}, "The segments are those of the model")
+        segment_list.rewrite_all(settings)
+        _report.tell(self, {"INFO"}, "The segments are those of the model")
         return {"FINISHED"}
 
 
@@ -48,8 +48,8 @@ class WKS_SEGMENT_OT_refresh_segments(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return feedback.in_object_mode(cls, context)
+        return _report.in_object_mode(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        segments.fill(context.scene.wks_segment)
+        segment_list.fill(context.scene.wks_segment)
         return {"FINISHED"}

@@ -8,9 +8,9 @@ import bpy
 from bpy.props import StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from .. import tasks
 from ..errors import UserError
-from . import feedback
+from ..workflow import pipeline
+from . import _report
 
 
 class WKS_SEGMENT_OT_save_model(bpy.types.Operator, ExportHelper):
@@ -25,7 +25,7 @@ class WKS_SEGMENT_OT_save_model(bpy.types.Operator, ExportHelper):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if not context.scene.wks_segment.model:
-            feedback.explain(cls, "No model yet: use Learn and Segment, or import a model")
+            _report.explain(cls, "No model yet: use Learn and Segment, or import a model")
             return False
         return True
 
@@ -33,11 +33,11 @@ class WKS_SEGMENT_OT_save_model(bpy.types.Operator, ExportHelper):
         path = Path(bpy.path.abspath(self.filepath))
         path = path if path.suffix else path.with_suffix(self.filename_ext)
         try:
-            model = tasks.stored_model(context.scene.wks_segment)
+            model = pipeline.stored_model(context.scene.wks_segment)
             model.part_notes_ = context.scene.wks_segment.notes()
             model.save(path)
         except (UserError, ValueError, OSError) as error:
-            feedback.tell(self, {"ERROR"}, f"The model was not saved: {error}")
+            _report.tell(self, {"ERROR"}, f"The model was not saved: {error}")
             return {"CANCELLED"}
-        feedback.tell(self, {"INFO"}, f"Saved the model to {path}")
+        _report.tell(self, {"INFO"}, f"Saved the model to {path}")
         return {"FINISHED"}

@@ -6,15 +6,15 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty
 
-from .. import tasks
-from ..characters import group, selected_meshes
-from ..corrected import GROUP, SOURCES, corrected_labels, corrected_parts, corrected_weights
-from ..edits import keep_by_hand
 from ..errors import UserError
-from ..labels import has_labels
-from ..report import Report
-from ..tasks import Wanted
-from . import feedback
+from ..outputs.import_labels import GROUP, SOURCES, corrected_labels, corrected_parts, corrected_weights
+from ..outputs.labels import has_labels
+from ..outputs.overrides import keep_by_hand
+from ..scene.characters import group, selected_meshes
+from ..workflow import pipeline
+from ..workflow.pipeline import Wanted
+from ..workflow.report import Report
+from . import _report
 
 
 class WKS_SEGMENT_OT_segments_from(bpy.types.Operator):
@@ -29,9 +29,9 @@ class WKS_SEGMENT_OT_segments_from(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return (
-            feedback.no_job_runs(cls, context)
-            and feedback.in_object_mode(cls, context)
-            and feedback.has_selected_mesh(cls, context)
+            _report.no_job_runs(cls, context)
+            and _report.in_object_mode(cls, context)
+            and _report.has_selected_mesh(cls, context)
         )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -44,18 +44,18 @@ class WKS_SEGMENT_OT_segments_from(bpy.types.Operator):
                 labels[character] = corrected_labels(character, self.source, found)
                 weights[character] = corrected_weights(character, found)
         except UserError as error:
-            feedback.tell(self, {"ERROR"}, str(error))
+            _report.tell(self, {"ERROR"}, str(error))
             return {"CANCELLED"}
         soft = weights if self.source == GROUP and settings.vertex_groups == "soft" else None
         # What was drawn last is what is meant, also where faces had a segment by hand.
         for mesh in (obj.data for character in labels for obj in character.objects):
             if has_labels(mesh):
                 keep_by_hand(mesh, np.full(len(mesh.polygons), -1))
-        tasks.write(settings, labels, Wanted.of(settings, labels), report, soft)
+        pipeline.write(settings, labels, Wanted.of(settings, labels), report, soft)
         if settings.write_colors:
-            feedback.show_colors(context)
+            _report.show_colors(context)
         for warning in report.warnings:
-            feedback.tell(self, {"WARNING"}, warning)
+            _report.tell(self, {"WARNING"}, warning)
         n_parts = sum(len(set(values.tolist())) for values in labels.values())
-        feedback.tell(self, {"INFO"}, f"{n_parts} segments taken over")
+        _report.tell(self, {"INFO"}, f"{n_parts} segments taken over")
         return {"FINISHED"}

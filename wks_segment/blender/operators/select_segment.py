@@ -6,9 +6,9 @@ import bmesh
 import bpy
 from bpy.props import BoolProperty
 
-from .. import segments
-from ..notes import note_of
-from . import feedback
+from ..outputs.ledger import note_of
+from ..workflow import segment_list
+from . import _report
 
 
 class WKS_SEGMENT_OT_select_segment(bpy.types.Operator):
@@ -22,7 +22,7 @@ class WKS_SEGMENT_OT_select_segment(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return feedback.has_segments(cls, context)
+        return _report.has_segments(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         self.extend = event.shift
@@ -30,12 +30,12 @@ class WKS_SEGMENT_OT_select_segment(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
-        part = segments.active_part(settings)
-        objects = [obj for obj in segments.labelled(settings) if obj.visible_get()]
+        part = segment_list.active_part(settings)
+        objects = [obj for obj in segment_list.labelled(settings) if obj.visible_get()]
         if context.mode == "EDIT_MESH":
             objects = [obj for obj in objects if obj.mode == "EDIT"]
         if part is None or not objects:
-            feedback.tell(self, {"WARNING"}, "No object with segments is to be seen here")
+            _report.tell(self, {"WARNING"}, "No object with segments is to be seen here")
             return {"CANCELLED"}
         context.scene.tool_settings.mesh_select_mode = (False, False, True)
         if context.mode == "OBJECT":
@@ -46,8 +46,8 @@ class WKS_SEGMENT_OT_select_segment(bpy.types.Operator):
             bpy.ops.object.mode_set(mode="EDIT")
         if not self.extend:
             bpy.ops.mesh.select_all(action="DESELECT")
-        count = sum(_select(mesh, part) for mesh in segments.meshes_of(objects))
-        feedback.tell(self, {"INFO"}, f"{count} faces of {settings.style().name_of(part)}")
+        count = sum(_select(mesh, part) for mesh in segment_list.meshes_of(objects))
+        _report.tell(self, {"INFO"}, f"{count} faces of {settings.style().name_of(part)}")
         return {"FINISHED"}
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import bpy
 
-from ..characters import group, selected_meshes
 from ..errors import UserError
-from ..labels import labels_on
-from ..separate import separate, whole_of
-from . import feedback
+from ..outputs.labels import labels_on
+from ..outputs.separate import separate, whole_of
+from ..scene.characters import group, selected_meshes
+from . import _report
 
 
 class WKS_SEGMENT_OT_separate(bpy.types.Operator):
@@ -21,9 +21,9 @@ class WKS_SEGMENT_OT_separate(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return (
-            feedback.no_job_runs(cls, context)
-            and feedback.in_object_mode(cls, context)
-            and feedback.has_labelled_mesh(cls, context)
+            _report.no_job_runs(cls, context)
+            and _report.in_object_mode(cls, context)
+            and _report.has_labelled_mesh(cls, context)
         )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -38,7 +38,7 @@ class WKS_SEGMENT_OT_separate(bpy.types.Operator):
                     if labels is not None:
                         pieces += separate(context, obj, labels, style)
         except UserError as error:
-            feedback.tell(self, {"ERROR"}, str(error))
+            _report.tell(self, {"ERROR"}, str(error))
             return {"CANCELLED"}
-        feedback.tell(self, {"INFO"}, f"Separated into {len(pieces)} objects")
+        _report.tell(self, {"INFO"}, f"Separated into {len(pieces)} objects")
         return {"FINISHED"}

@@ -6,11 +6,11 @@ import bpy
 import numpy as np
 from bpy.props import IntProperty
 
-from ...core.mesh import BoolArray, IntArray
-from .. import segments
-from ..edits import values
-from ..labels import labels_on
-from . import feedback
+from ...core.mesh.triangle_mesh import BoolArray, IntArray
+from ..outputs.labels import labels_on
+from ..outputs.overrides import values
+from ..workflow import segment_list
+from . import _report
 
 
 class _Shows:
@@ -20,7 +20,7 @@ class _Shows:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return feedback.has_segments(cls, context)
+        return _report.has_segments(cls, context)
 
     def hidden(self, labels: IntArray, before: BoolArray, settings: bpy.types.PropertyGroup) -> BoolArray:
         """(p,) whether faces of these parts are hidden, given whether they were."""
@@ -28,17 +28,17 @@ class _Shows:
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
-        meshes, count = segments.meshes_of(segments.labelled(settings)), 0
-        with segments.object_mode(context):
+        meshes, count = segment_list.meshes_of(segment_list.labelled(settings)), 0
+        with segment_list.object_mode(context):
             for mesh in meshes:
                 labels = labels_on(mesh)
                 if labels is not None:
                     hidden = self.hidden(labels, values(mesh.polygons, "hide", bool), settings)
                     _hide(mesh, hidden)
                     count += int(hidden.sum())
-            segments.fill(settings)
+            segment_list.fill(settings)
         where = " in Edit Mode, Sculpt Mode and while painting" if count and context.mode == "OBJECT" else ""
-        feedback.tell(self, {"INFO"}, f"{count or 'No'} faces are hidden{where}")
+        _report.tell(self, {"INFO"}, f"{count or 'No'} faces are hidden{where}")
         return {"FINISHED"}
 
 
@@ -54,7 +54,7 @@ class WKS_SEGMENT_OT_hide_segment(_Shows, bpy.types.Operator):
     )  # fmt: skip
 
     def hidden(self, labels: IntArray, before: BoolArray, settings: bpy.types.PropertyGroup) -> BoolArray:
-        part = self.part if self.part >= 0 else segments.active_part(settings)
+        part = self.part if self.part >= 0 else segment_list.active_part(settings)
         shown = any(item.number == part and not item.hidden for item in settings.segments)
         return np.where(labels == part, shown, before)
 
@@ -66,7 +66,7 @@ class WKS_SEGMENT_OT_isolate_segment(_Shows, bpy.types.Operator):
     bl_label = "Isolate Segment"
 
     def hidden(self, labels: IntArray, before: BoolArray, settings: bpy.types.PropertyGroup) -> BoolArray:
-        return np.asarray(labels != segments.active_part(settings))
+        return np.asarray(labels != segment_list.active_part(settings))
 
 
 class WKS_SEGMENT_OT_show_segments(_Shows, bpy.types.Operator):

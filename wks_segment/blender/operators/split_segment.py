@@ -5,14 +5,15 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from .. import parts, segments
-from ..characters import group
-from ..edits import by_hand, keep_by_hand
 from ..errors import UserError
-from ..palette import MAX_COLOURS
-from ..pieces import pieces_of
-from ..poses import polygon_ranges
-from . import feedback
+from ..outputs import part_ids
+from ..outputs.connected_regions import pieces_of
+from ..outputs.overrides import by_hand, keep_by_hand
+from ..outputs.palette import MAX_COLOURS
+from ..scene.characters import group
+from ..scene.poses import polygon_ranges
+from ..workflow import segment_list
+from . import _report
 
 
 class WKS_SEGMENT_OT_split_segment(bpy.types.Operator):
@@ -24,12 +25,12 @@ class WKS_SEGMENT_OT_split_segment(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return feedback.has_segments(cls, context, "OBJECT")
+        return _report.has_segments(cls, context, "OBJECT")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
-        part = segments.active_part(settings)
-        objects = segments.labelled(settings)
+        part = segment_list.active_part(settings)
+        objects = segment_list.labelled(settings)
         if part is None:
             return {"CANCELLED"}
         name = settings.style().name_of(part)
@@ -39,17 +40,19 @@ class WKS_SEGMENT_OT_split_segment(bpy.types.Operator):
             if count > MAX_COLOURS:
                 raise UserError(f"{name} is in {count} pieces, too many for a list: raise Smallest Part (Advanced)")
         except UserError as error:
-            feedback.tell(self, {"ERROR"}, str(error))
+            _report.tell(self, {"ERROR"}, str(error))
             return {"CANCELLED"}
         if count < 2:
-            feedback.tell(self, {"WARNING"}, f"{name} is in one piece on these objects; nothing to split")
+            _report.tell(self, {"WARNING"}, f"{name} is in one piece on these objects; nothing to split")
             return {"CANCELLED"}
-        new = [segments.make_part(settings, parts.base_of(name), part // parts.SIDE) for _ in range(count - 1)]
+        new = [
+            segment_list.make_part(settings, part_ids.base_of(name), part // part_ids.SIDE) for _ in range(count - 1)
+        ]
         number = np.array([-1, *new])
         for character, pieces in found.items():
             for obj, polygons in polygon_ranges(character):
                 mine = number[np.maximum(pieces[polygons], 0)]
                 keep_by_hand(obj.data, np.where(mine < 0, by_hand(obj.data), mine))
-        segments.rewrite_all(settings, objects)
-        feedback.tell(self, {"INFO"}, f"{name} is in {count} parts now")
+        segment_list.rewrite_all(settings, objects)
+        _report.tell(self, {"INFO"}, f"{name} is in {count} parts now")
         return {"FINISHED"}

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import bpy
 
-from .. import poses as reader
-from .. import tasks
-from ..bodies import Body
-from ..characters import group, mesh_objects
 from ..errors import UserError
-from ..labels import labels_on
-from ..report import Report
-from ..tasks import Wanted
-from ..transfer import transferred
-from . import feedback
+from ..outputs.labels import labels_on
+from ..outputs.transfer import transferred
+from ..scene import poses as reader
+from ..scene.characters import group, mesh_objects
+from ..scene.mesh_arrays import Body
+from ..workflow import pipeline
+from ..workflow.pipeline import Wanted
+from ..workflow.report import Report
+from . import _report
 
 
 class WKS_SEGMENT_OT_transfer(bpy.types.Operator):
@@ -25,14 +25,14 @@ class WKS_SEGMENT_OT_transfer(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not (feedback.no_job_runs(cls, context) and feedback.in_object_mode(cls, context)):
+        if not (_report.no_job_runs(cls, context) and _report.in_object_mode(cls, context)):
             return False
         active = context.active_object
         if active is None or active.type != "MESH" or labels_on(active.data) is None:
-            feedback.explain(cls, "The active object, the one that was clicked last, has no segments")
+            _report.explain(cls, "The active object, the one that was clicked last, has no segments")
             return False
         if not set(mesh_objects(context.selected_objects)) - {active}:
-            feedback.explain(cls, "Select the objects that are to get segments, and last the one that has them")
+            _report.explain(cls, "Select the objects that are to get segments, and last the one that has them")
             return False
         return True
 
@@ -47,15 +47,15 @@ class WKS_SEGMENT_OT_transfer(bpy.types.Operator):
                 if obj.data is not active.data:
                     (character,) = group([obj])
                     (target,) = reader.read_objects(context, [character])
-                    labels[character] = tasks.filled(transferred(source, target), Body.of(character))
+                    labels[character] = pipeline.filled(transferred(source, target), Body.of(character))
         except UserError as error:
-            feedback.tell(self, {"ERROR"}, str(error))
+            _report.tell(self, {"ERROR"}, str(error))
             return {"CANCELLED"}
-        tasks.write(settings, labels, Wanted.of(settings, labels), report)
+        pipeline.write(settings, labels, Wanted.of(settings, labels), report)
         if settings.write_colors:
-            feedback.show_colors(context)
+            _report.show_colors(context)
         for warning in report.warnings:
-            feedback.tell(self, {"WARNING"}, warning)
+            _report.tell(self, {"WARNING"}, warning)
         targets = "1 object" if len(labels) == 1 else f"{len(labels)} objects"
-        feedback.tell(self, {"INFO"}, f"Transferred to {targets}")
+        _report.tell(self, {"INFO"}, f"Transferred to {targets}")
         return {"FINISHED"}

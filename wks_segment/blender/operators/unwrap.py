@@ -5,11 +5,11 @@ from __future__ import annotations
 import bpy
 from bpy.props import EnumProperty
 
-from ..characters import group, selected_meshes
 from ..errors import UserError
-from ..labels import labels_on
-from ..uv_maps import METHODS, check_room, unwrap_parts, write_uv_map
-from . import feedback
+from ..outputs.labels import labels_on
+from ..outputs.uv_maps import METHODS, check_room, unwrap_parts, write_uv_map
+from ..scene.characters import group, selected_meshes
+from . import _report
 
 
 class WKS_SEGMENT_OT_unwrap(bpy.types.Operator):
@@ -24,9 +24,9 @@ class WKS_SEGMENT_OT_unwrap(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return (
-            feedback.no_job_runs(cls, context)
-            and feedback.in_object_mode(cls, context)
-            and feedback.has_labelled_mesh(cls, context)
+            _report.no_job_runs(cls, context)
+            and _report.in_object_mode(cls, context)
+            and _report.has_labelled_mesh(cls, context)
         )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -38,8 +38,8 @@ class WKS_SEGMENT_OT_unwrap(bpy.types.Operator):
             for mesh, labels in meshes.items():
                 write_uv_map(mesh, unwrap_parts(context, mesh, labels, self.method))
         except UserError as error:
-            feedback.tell(self, {"ERROR"}, str(error))
+            _report.tell(self, {"ERROR"}, str(error))
             return {"CANCELLED"}
         unwrapped = "1 mesh" if len(meshes) == 1 else f"{len(meshes)} meshes"
-        feedback.tell(self, {"INFO"}, f"Unwrapped {unwrapped} by segments")
+        _report.tell(self, {"INFO"}, f"Unwrapped {unwrapped} by segments")
         return {"FINISHED"}

@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 
 from ..errors import UserError
-from ..session import NOTHING, session_of
-from . import feedback
+from ..workflow.live_session import NOTHING, session_of
+from . import _report
 
 
 class WKS_SEGMENT_OT_update(bpy.types.Operator):
@@ -19,14 +19,14 @@ class WKS_SEGMENT_OT_update(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if not session_of(context).holds(context.scene):
-            feedback.explain(cls, NOTHING)
+            _report.explain(cls, NOTHING)
             return False
-        return feedback.no_job_runs(cls, context) and feedback.in_object_mode(cls, context)
+        return _report.no_job_runs(cls, context) and _report.in_object_mode(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
             work = session_of(context).update(context.scene)
         except UserError as error:
-            feedback.tell(self, {"ERROR"}, str(error))
+            _report.tell(self, {"ERROR"}, str(error))
             return {"CANCELLED"}
-        return feedback.finish(self, "Updated", work.report)
+        return _report.finish(self, "Updated", work.report)

@@ -1,0 +1,76 @@
+"""The code blocks of docs/recipes.md run as they stand there, one after the other, and print what stands below them."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import bpy
+import pytest
+from builders import limbed, rig
+
+ROOT = Path(__file__).resolve().parents[3]
+PAGE = ROOT / "docs" / "recipes.md"
+BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```\n(?:```text\n(.*?)^```\n)?", re.MULTILINE | re.DOTALL)
+HEADING = re.compile(r"^## (.*)", re.MULTILINE)
+BENDS = (0.0, 0.3, 0.6)
+
+
+class Recipe(NamedTuple):
+    """A code block, and what it prints; None: nobody says."""
+
+    language: str
+    code: str
+    printed: str | None
+
+
+def recipes():
+    page = PAGE.read_text(encoding="utf-8")
+    for block in BLOCK.finditer(page):
+        title = HEADING.findall(page[: block.start()])[-1]
+        recipe = Recipe(block[1], block[2], block[3])
+        yield pytest.param(recipe, id=re.sub(r"\W+", "_", title.lower()))
+
+
+def test_no_block_of_the_page_is_left_out():
+    page = PAGE.read_text(encoding="utf-8")
+    assert len(list(recipes())) == len(re.findall(r"^```(?!text)\w+$", page, re.MULTILINE)) > 0
+
+
+@pytest.fixture(scope="module")
+def kitchen(extension, tmp_path_factory):
+    """A folder with the files that the page speaks of, and a `python` that is this one."""
+    folder = tmp_path_factory.mktemp("kitchen")
+    (folder / "characters").mkdir()
+    (folder / "bin").mkdir()
+    python = folder / "bin" / "python"
+    python.write_text(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')
+    python.chmod(0o755)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    rig([limbed("Walker", subdivisions=3)])
+    bpy.ops.export_scene.gltf(filepath=str(folder / "walk.glb"))
+    for name in ("knight", "thief"):
+        shutil.copy(folder / "walk.glb", folder / "characters" / f"{name}.glb")
+    (folder / "characters" / "broken.glb").write_text("no glTF")
+    for i, bend in enumerate(BENDS, start=1):
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        limbed(f"Pose {i}", bend, subdivisions=3)
+        bpy.ops.wm.obj_export(filepath=str(folder / f"pose_{i}.obj"))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    return folder
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="the recipes are for a Unix shell")
+@pytest.mark.parametrize("recipe", recipes())
+def test_recipe(recipe, kitchen, needs_rendering):
+    shell = ["bash", "-e", "-o", "pipefail", "-c"] if recipe.language == "sh" else [sys.executable, "-c"]
+    paths = {"PATH": f"{kitchen / 'bin'}{os.pathsep}{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [*shell, recipe.code], cwd=kitchen, env=os.environ | paths, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    if recipe.printed is not None:
+        assert done.stdout == recipe.printed

@@ -1,0 +1,135 @@
+"""Colours: the same for a segment whatever the number of segments, and clearly different to the eye."""
+
+import numpy as np
+import pytest
+
+from wks_segment.blender.outputs import palette as module
+from wks_segment.blender.outputs.palette import MAX_COLOURS, colors_of, oklab, palette, sided_palette
+
+
+def test_first_colours_do_not_depend_on_how_many_there_are(monkeypatch):
+    few = module.palette.__wrapped__()
+    monkeypatch.setattr(module, "MAX_COLOURS", 12)
+    np.testing.assert_array_equal(module.palette.__wrapped__(), few[:12])
+
+
+def test_colours_are_srgb_and_cannot_be_changed_by_accident():
+    colours = palette()
+    assert colours.shape == (MAX_COLOURS, 3)
+    assert ((colours >= 0) & (colours <= 1)).all()
+    with pytest.raises(ValueError, match="read-only"):
+        colours[0] = 0
+
+
+def closest_pair(count):
+    lab = oklab(palette()[:count])
+    distance = np.linalg.norm(lab[:, None] - lab[None], axis=2)
+    return distance[np.triu_indices(count, 1)].min()
+
+
+@pytest.mark.parametrize(("count", "least"), [(8, 0.14), (20, 0.08), (MAX_COLOURS, 0.04)])
+def test_no_two_colours_are_close(count, least):
+    assert closest_pair(count) > least
+
+
+def test_no_colour_is_dark_or_grey_or_white():
+    colours = palette()
+    lab = oklab(colours)
+    assert lab[:, 0].min() >= 0.49
+    assert lab[:, 0].max() <= 0.9
+    assert np.hypot(lab[:, 1], lab[:, 2]).min() >= 0.08
+    assert colours.max(axis=1).min() > 0.4
+
+
+def test_parts_in_the_middle_have_the_colours_of_the_palette():
+    np.testing.assert_array_equal(sided_palette()[0], palette())
+    np.testing.assert_array_equal(
+        colors_of(np.array([5, 1005, 2005, 5 + MAX_COLOURS])), sided_palette()[[0, 1, 2, 0], 5]
+    )
+
+
+@pytest.mark.parametrize(("count", "least"), [(8, 0.1), (12, 0.07), (20, 0.05), (MAX_COLOURS, 0.025)])
+def test_no_two_parts_have_close_colours(count, least):
+    lab = oklab(sided_palette()[:, :count].reshape(-1, 3))
+    distance = np.linalg.norm(lab[:, None] - lab[None], axis=2)
+    assert distance[np.triu_indices(len(lab), 1)].min() > least
+
+
+def test_left_is_light_and_right_is_dark_and_both_are_of_about_one_hue():
+    middle, left, right = oklab(sided_palette())
+    assert left[:, 0].min() > right[:, 0].max() + 0.05
+    assert np.linalg.norm(left - right, axis=1).min() > 0.11
+    hues = np.arctan2(*np.moveaxis(np.stack([middle, left, right])[..., [2, 1]], -1, 0))
+    away = np.abs((hues[1:] - hues[0] + np.pi) % (2 * np.pi) - np.pi)
+    assert away.max() < np.radians(36)
+
+
+def test_no_part_is_black_or_grey_or_white():
+    lab = oklab(sided_palette())
+    assert 0.43 < lab[..., 0].min() < lab[..., 0].max() < 0.93
+    assert np.hypot(lab[..., 1], lab[..., 2]).min() > 0.055
+    assert sided_palette().max(axis=2).min() > 0.3
+
+
+def test_oklab_of_known_colours():
+    """The values that Ottosson gives for the primaries, to three digits."""
+    primaries = np.array([[1.0, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]])
+    known = [[1, 0, 0], [0.628, 0.225, 0.126], [0.866, -0.234, 0.179], [0.452, -0.032, -0.312], [0, 0, 0]]
+    np.testing.assert_allclose(oklab(primaries), known, atol=1e-3)
+
+
+# Palettes to choose from
+
+BLINDNESS = {
+    "without red": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+    "without green": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
+    "without blue": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
+}
+"""Machado, Oliveira and Fernandes (2009), severity 1: what who lacks a kind of cones sees, in linear light."""
+
+
+def as_seen(srgb, eyes):
+    """sRGB colours as somebody sees them."""
+    light = np.clip(module.linear(srgb) @ np.array(eyes).T, 0, 1)
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+
+
+def closest(srgb):
+    lab = oklab(srgb.reshape(-1, 3))
+    distance = np.linalg.norm(lab[:, None] - lab[None], axis=2)
+    return distance[np.triu_indices(len(lab), 1)].min()
+
+
+@pytest.mark.parametrize(("count", "least"), [(4, 0.3), (8, 0.14), (12, 0.11), (16, 0.1), (MAX_COLOURS, 0.04)])
+@pytest.mark.parametrize("eyes", [np.eye(3), *BLINDNESS.values()], ids=["all cones", *BLINDNESS])
+def test_color_blind_safe_colors_are_told_apart_without_a_kind_of_cones(eyes, count, least):
+    assert closest(as_seen(palette("color_blind")[:count], eyes)) > least
+
+
+@pytest.mark.parametrize("eyes", [np.eye(3), *BLINDNESS.values()], ids=["all cones", *BLINDNESS])
+def test_color_blind_safe_colors_of_sides_are_told_apart(eyes):
+    colors = as_seen(sided_palette("color_blind")[:, :8], eyes)
+    assert closest(colors) > 0.045
+    assert np.linalg.norm(oklab(colors[1]) - oklab(colors[2]), axis=1).min() > 0.13
+
+
+def test_the_calm_palette_is_not_color_blind_safe():
+    """Else there would be no need of another."""
+    assert min(closest(as_seen(palette()[:8], eyes)) for eyes in BLINDNESS.values()) < 0.06
+
+
+@pytest.mark.parametrize(("count", "least"), [(8, 0.27), (16, 0.17), (MAX_COLOURS, 0.09)])
+def test_maximally_different_colors_are_farther_apart_than_the_calm_ones(count, least):
+    assert closest(palette("maximal")[:count]) > max(least, 1.2 * closest(palette()[:count]))
+
+
+@pytest.mark.parametrize("name", module.RECIPES)
+def test_every_palette_is_srgb_and_has_nothing_black_and_a_left_lighter_than_the_right(name):
+    colors = sided_palette(name)
+    assert colors.shape == (3, MAX_COLOURS, 3)
+    assert ((colors >= 0) & (colors <= 1)).all()
+    middle, left, right = oklab(colors)
+    assert middle[:, 0].min() > 0.24
+    assert left[:, 0].min() > right[:, 0].max() + 0.04
+    in_bytes = np.rint(255 * colors).reshape(-1, 3)
+    assert len(np.unique(in_bytes, axis=0)) == 3 * MAX_COLOURS

@@ -1,0 +1,140 @@
+"""Segments that are shown and not written: nothing of the mesh changes until they are accepted."""
+
+import bpy
+import numpy as np
+import pytest
+from builders import changes, labels_of, limbed_rigged, scene_snapshot, select, snapshot
+
+from wks_segment.blender.outputs.palette import colors_of
+from wks_segment.blender.ui.preview import DARKEST, OFFSET, picture
+from wks_segment.blender.workflow.live_session import session_of
+
+pytestmark = pytest.mark.usefixtures("scene")
+OPS = bpy.ops.wks_segment
+
+
+@pytest.fixture
+def session(scene):
+    found = session_of(bpy.context)
+    found.drop()
+    return found
+
+
+@pytest.fixture
+def walker(session, settings):
+    """A character that was learned from two frames, and is previewed."""
+    obj = limbed_rigged()
+    select(obj)
+    settings.source, settings.pose_count = "FRAMES", 2
+    assert OPS.learn() == {"FINISHED"}
+    settings.preview = True
+    return obj
+
+
+def rest(session):
+    """What the timer does when the settings have rested."""
+    session._due = 0.0
+    if bpy.app.timers.is_registered(session.timer):
+        bpy.app.timers.unregister(session.timer)
+    assert session.tick() is None
+
+
+def test_what_is_shown_is_not_written(walker, settings, session):
+    before, model = snapshot(walker.data), settings.model
+    settings.n_segments = 2
+    rest(session)
+    assert session.preview.shown
+    assert len(session.preview.places) == len(session.preview.colors) == 3 * len(walker.data.polygons)
+    assert not changes(before, snapshot(walker.data))
+    assert settings.model == model
+
+
+def test_accept_writes_what_was_shown(walker, settings, session):
+    settings.n_segments = 2
+    rest(session)
+    shown = next(iter(session.proposed[1].labels.values()))
+    assert OPS.accept() == {"FINISHED"}
+    np.testing.assert_array_equal(labels_of(walker), shown)
+    assert set(shown) == {0, 1}
+    assert not session.preview.shown
+    assert len(session.preview.places) == 0
+    assert session.follows(bpy.context.scene)
+    assert not OPS.accept.poll()
+
+
+def test_discard_takes_back_the_settings(walker, settings, session):
+    before = snapshot(walker.data)
+    settings.n_segments, settings.smoothness, settings.snap_to = 2, 2.0, {"sharp"}
+    rest(session)
+    assert OPS.discard() == {"FINISHED"}
+    assert (settings.n_segments, settings.smoothness, settings.snap_to) == (4, 1.0, set())
+    assert not session.preview.shown
+    rest(session)
+    assert not session.preview.shown
+    assert not changes(before, snapshot(walker.data))
+    assert not OPS.discard.poll()
+
+
+def test_accept_can_be_undone(walker, settings, session):
+    settings.n_segments = 2
+    rest(session)
+    bpy.ops.ed.undo_push(message="before")
+    before = labels_of(walker)
+    assert OPS.accept("EXEC_DEFAULT", True) == {"FINISHED"}
+    bpy.ops.ed.undo()
+    np.testing.assert_array_equal(labels_of(bpy.data.objects["Walker"]), before)
+
+
+def test_undo_shows_nothing_any_more(walker, settings, session):
+    bpy.ops.ed.undo_push(message="before")
+    settings.n_segments = 2
+    rest(session)
+    bpy.ops.ed.undo_push(message="after")
+    bpy.ops.ed.undo()
+    assert session.proposed is None
+    assert not session.preview.shown
+
+
+@pytest.mark.parametrize("how", ["learn", "load", "edit"])
+def test_what_is_shown_goes_when_it_is_of_yesterday(walker, settings, session, how, tmp_path):
+    settings.n_segments = 2
+    rest(session)
+    if how == "learn":
+        OPS.learn()
+    elif how == "load":
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    else:
+        walker.data.vertices[0].co.x += 1
+        before = scene_snapshot()
+        with pytest.raises(RuntimeError, match="was edited"):
+            OPS.accept()
+        assert not changes(before, scene_snapshot())
+    assert session.proposed is None
+    assert not session.preview.shown
+
+
+def test_the_picture_is_of_what_is_seen(walker, settings, session):
+    """At another frame, through a modifier, a little above the surface, in the colours of the parts, shaded."""
+    walker.modifiers.new("Fine", "SUBSURF").levels = 1
+    bpy.context.scene.frame_set(11)
+    work = session.work
+    (character,) = {pose.character for pose in work.poses}
+    labels = np.arange(len(walker.data.polygons)) % 3
+    places, colors = picture(bpy.context, {character: labels})
+    evaluated = walker.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    seen = np.array([vertex.co for vertex in evaluated.vertices])
+    assert len(places) == 3 * 2 * 3 * len(walker.data.polygons)  # three quads for each triangle
+    size = np.ptp(seen, axis=0).max()
+    nearest = np.linalg.norm(places[::50, None] - seen, axis=2).min(axis=1)
+    np.testing.assert_allclose(nearest, OFFSET * size, rtol=1e-3)
+    assert (colors[:, 3] == 1).all()
+    plain = colors_of(np.repeat(labels, 6))
+    shade = colors[::3, :3].max(axis=1) / plain.max(axis=1)
+    np.testing.assert_allclose(colors[::3, :3], plain * shade[:, None], atol=1e-6)
+    assert DARKEST - 1e-6 <= shade.min() < shade.max() <= 1 + 1e-6
+
+
+def test_nothing_is_shown_of_what_is_not_there():
+    places, colors = picture(bpy.context, {})
+    assert places.shape == (0, 3)
+    assert colors.shape == (0, 4)

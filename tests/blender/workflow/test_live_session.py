@@ -1,0 +1,407 @@
+"""Labels that follow the settings: the same as if they were learned or applied so, at once, undoable."""
+
+import bpy
+import numpy as np
+import pytest
+from builders import changes, coordinates, labels_of, limbed_poses, limbed_rigged, select, snapshot
+
+from wks_segment.blender.operators._base import RunsWork
+from wks_segment.blender.workflow import live_session as module
+from wks_segment.blender.workflow.live_session import session_of
+from wks_segment.core import PoseSegmentation
+
+pytestmark = pytest.mark.usefixtures("scene")
+OPS = bpy.ops.wks_segment
+
+
+@pytest.fixture
+def session(scene):
+    found = session_of(bpy.context)
+    found.drop()
+    found.cache.clear()
+    return found
+
+
+@pytest.fixture
+def walker(session, settings):
+    """A character that was learned from two frames."""
+    obj = limbed_rigged()
+    select(obj)
+    settings.source, settings.pose_count = "FRAMES", 2
+    assert OPS.learn() == {"FINISHED"}
+    return obj
+
+
+@pytest.fixture
+def fits(monkeypatch):
+    """How often a model was fitted, and how often a pose described."""
+    times = {"fit": 0, "describe": 0}
+    fit, solve = PoseSegmentation.fit, module.MemoryCache.put
+
+    def counted_fit(self, *arguments):
+        times["fit"] += 1
+        return fit(self, *arguments)
+
+    def counted_put(self, *arguments):
+        times["describe"] += 1
+        return solve(self, *arguments)
+
+    monkeypatch.setattr(PoseSegmentation, "fit", counted_fit)
+    monkeypatch.setattr(module.MemoryCache, "put", counted_put)
+    return times
+
+
+def rest(session):
+    """What the timer does when the settings have rested."""
+    session._due = 0.0
+    if bpy.app.timers.is_registered(session.timer):
+        bpy.app.timers.unregister(session.timer)
+    return session.tick()
+
+
+# Signatures are not computed twice
+
+
+def test_a_second_run_computes_no_signature(walker, settings, fits):
+    OPS.clear()
+    settings.n_segments = 3
+    assert OPS.learn() == {"FINISHED"}
+    assert fits == {"fit": 1, "describe": 0}
+    assert len(np.unique(labels_of(walker))) == 3
+
+
+def test_a_moved_vertex_is_another_mesh(walker, fits):
+    walker.data.vertices[5].co.x += 0.01
+    assert OPS.learn() == {"FINISHED"}
+    assert fits == {"fit": 1, "describe": 2}
+
+
+# Labels follow
+
+
+@pytest.mark.parametrize(("name", "value"), [("smoothness", 0.0), ("min_share", 8.0), ("n_segments", 3)])
+def test_labels_follow_a_setting_and_are_those_of_apply(walker, settings, session, fits, name, value):
+    before = labels_of(walker)
+    setattr(settings, name, value)
+    np.testing.assert_array_equal(labels_of(walker), before)  # not while the user drags
+    assert rest(session) is None
+    follows = labels_of(walker)
+    assert (follows != before).any()
+    assert fits == {"fit": 0, "describe": 0}
+    # The model that is stored now says the same by itself, on the same poses.
+    stored = PoseSegmentation.from_json(settings.model)
+    work = session.work
+    again = stored.segment_polygons(
+        [piece.pose for piece in work.described],
+        [pose.polygon_of for pose in work.poses],
+        settings.min_share / 100,
+    )
+    np.testing.assert_array_equal(follows, again)
+
+
+def test_sides_follow(session, settings):
+    from wks_segment.blender.cli import creature
+
+    obj = creature.build_creature(bpy.context.scene)
+    select(obj)
+    settings.source, settings.pose_count = "FRAMES", 2
+    settings.n_segments, settings.n_eigenpairs = 5, 60
+    assert OPS.learn() == {"FINISHED"}
+    one = labels_of(obj)
+    settings.sides = "two"
+    rest(session)
+    two = labels_of(obj)
+    np.testing.assert_array_equal(two % 1000, one)
+    assert {1, 2} <= set(two // 1000)
+    settings.sides = "one"
+    rest(session)
+    np.testing.assert_array_equal(labels_of(obj), one)
+
+
+def test_the_number_that_was_learned_comes_back_as_it_was(walker, settings, session):
+    before, model = labels_of(walker), settings.model
+    for number in (2, 6, 4):
+        settings.n_segments = number
+        rest(session)
+    np.testing.assert_array_equal(labels_of(walker), before)
+    assert settings.model == model
+
+
+def test_one_segment_more_leaves_the_others_their_numbers(walker, settings, session):
+    settings.n_segments = 2
+    rest(session)
+    before = labels_of(walker)
+    settings.n_segments = 3
+    rest(session)
+    after = labels_of(walker)
+    others = after != 2
+    assert set(after) == {0, 1, 2}
+    assert (after == before)[others].mean() > 0.9  # borders move a little
+
+
+def test_a_changed_seed_needs_nothing(walker, settings, session):
+    before = snapshot(walker.data)
+    settings.random_state = 5
+    rest(session)
+    assert not changes(before, snapshot(walker.data))
+    assert session.follows(bpy.context.scene)
+
+
+def test_what_was_applied_follows_and_the_model_with_it(walker, settings, session, fits):
+    other = limbed_poses(0.7)[0]
+    select(other)
+    assert OPS.apply() == {"FINISHED"}
+    learned = labels_of(walker)
+    settings.n_segments = 2
+    rest(session)
+    assert set(labels_of(other)) == {0, 1}
+    np.testing.assert_array_equal(labels_of(walker), learned)
+    assert PoseSegmentation.from_json(settings.model).n_segments_ == 2
+    assert settings.model_summary.splitlines()[:2] == ["From Walker", "2 segments"]
+    assert fits["fit"] == 0
+
+
+def test_a_number_in_the_settings_that_the_model_never_had_changes_nothing(walker, settings, session):
+    """A model of four segments is applied while the setting says seven: smoothness alone must not make it seven."""
+    settings.live, settings.n_segments = False, 7
+    assert OPS.apply() == {"FINISHED"}
+    settings.live, settings.smoothness = True, 1.5
+    rest(session)
+    assert labels_of(walker).max() == 3
+
+
+def test_each_object_follows_where_objects_are_poses(session, settings):
+    poses = limbed_poses(0.0, 0.5, 1.0)
+    select(*poses)
+    assert OPS.learn() == {"FINISHED"}
+    settings.n_segments = 2
+    rest(session)
+    assert [set(labels_of(obj)) for obj in poses] == [{0, 1}] * 3
+
+
+def test_other_outputs_are_written_again(walker, settings, session):
+    settings.vertex_groups, settings.write_materials = "soft", True
+    assert OPS.learn() == {"FINISHED"}
+    settings.n_segments = 3
+    rest(session)
+    names = [group.name for group in walker.vertex_groups if group.name.startswith("WKS")]
+    assert names == ["WKS Segment 1", "WKS Segment 2", "WKS Segment 3"]
+    assert len(walker.data.materials) == 3
+
+
+# Undo
+
+
+def test_a_change_can_be_undone_by_itself_and_redone(walker, settings, session):
+    bpy.ops.ed.undo_push(message="learned")
+    name, four = walker.name, labels_of(walker)
+    settings.n_segments = 2
+    bpy.ops.ed.undo_push(message="the slider")
+    rest(session)
+    two = labels_of(bpy.data.objects[name])
+    assert bpy.ops.ed.undo() == {"FINISHED"}
+    np.testing.assert_array_equal(labels_of(bpy.data.objects[name]), four)
+    assert bpy.context.scene.wks_segment.n_segments == 4, "the setting stays when its labels go"
+    assert session.follows(bpy.context.scene)
+    assert bpy.ops.ed.redo() == {"FINISHED"}
+    np.testing.assert_array_equal(labels_of(bpy.data.objects[name]), two)
+    assert bpy.context.scene.wks_segment.n_segments == 2
+    assert session.follows(bpy.context.scene)
+    bpy.context.scene.wks_segment.n_segments = 3
+    rest(session)
+    assert labels_of(bpy.data.objects[name]).max() == 2
+
+
+def test_undo_leaves_a_setting_that_labels_do_not_follow(walker, settings, session):
+    settings.live, settings.n_segments, settings.snap_to = False, 2, {"sharp"}
+    bpy.ops.ed.undo_push(message="settings")
+    walker.location.x = 1
+    bpy.ops.ed.undo_push(message="moved")
+    assert bpy.ops.ed.undo() == {"FINISHED"}
+    assert bpy.context.scene.wks_segment.n_segments == 2
+    assert bpy.context.scene.wks_segment.snap_to == {"sharp"}
+
+
+def test_undo_of_something_else_leaves_a_number_that_was_refused(walker, settings, session):
+    settings.n_segments = 60
+    rest(session)
+    assert "takes a new Learn and Segment" in session.said
+    bpy.ops.ed.undo_push(message="the number")
+    walker.location.x = 1
+    bpy.ops.ed.undo_push(message="moved")
+    assert bpy.ops.ed.undo() == {"FINISHED"}
+    assert bpy.context.scene.wks_segment.n_segments == 60
+    assert "takes a new Learn and Segment" in session.said
+
+
+def test_what_was_undone_does_not_come_back_when_a_preview_is_discarded(walker, settings, session):
+    bpy.ops.ed.undo_push(message="learned")
+    settings.n_segments = 2
+    bpy.ops.ed.undo_push(message="the slider")
+    rest(session)
+    assert bpy.ops.ed.undo() == {"FINISHED"}
+    settings = bpy.context.scene.wks_segment
+    settings.preview, settings.n_segments = True, 3
+    rest(session)
+    session.discard(bpy.context.scene)
+    assert settings.n_segments == 4
+
+
+def test_between_two_steps_of_redo_an_update_is_offered(walker, settings, session):
+    bpy.ops.ed.undo_push(message="learned")
+    settings.n_segments = 2
+    bpy.ops.ed.undo_push(message="the slider")
+    rest(session)
+    bpy.ops.ed.undo()
+    rest(session)
+    bpy.ops.ed.undo()
+    bpy.ops.ed.redo()
+    assert not session.follows(bpy.context.scene)
+    assert not session.waits
+    assert OPS.update.poll()
+
+
+def test_after_undo_of_learning_nothing_follows(session, settings):
+    obj = limbed_rigged()
+    select(obj)
+    settings.source, settings.pose_count = "FRAMES", 2
+    bpy.ops.ed.undo_push(message="before")
+    assert OPS.learn("EXEC_DEFAULT", True) == {"FINISHED"}
+    bpy.ops.ed.undo()
+    settings = bpy.context.scene.wks_segment
+    settings.n_segments = 2
+    assert rest(session) is None
+    assert "wks_segment" not in bpy.data.objects["Walker"].data.attributes
+    assert not OPS.update.poll()
+
+
+def test_adjusting_learn_does_not_learn_again(session, settings, fits, monkeypatch):
+    # Blender's own undo_redo crashes without a window: what it does is undo, and call again with a flag.
+    obj = limbed_rigged()
+    select(obj)
+    settings.source, settings.pose_count = "FRAMES", 2
+    bpy.ops.ed.undo_push(message="before")
+    assert OPS.learn("EXEC_DEFAULT", True) == {"FINISHED"}
+    assert fits == {"fit": 1, "describe": 2}
+    last = bpy.context.window_manager.operators[-1]
+    assert last.bl_idname == "WKS_SEGMENT_OT_learn"
+    assert (last.n_segments, last.auto_segments, last.sides) == (4, False, "one")
+    bpy.ops.ed.undo()
+    assert bpy.context.scene.wks_segment.applied == ""
+    monkeypatch.setattr(RunsWork, "is_adjusted", True)
+    assert OPS.learn("EXEC_DEFAULT", True, n_segments=2) == {"FINISHED"}
+    assert set(labels_of(bpy.data.objects["Walker"])) == {0, 1}
+    assert bpy.context.scene.wks_segment.n_segments == 2
+    assert fits == {"fit": 1, "describe": 2}
+
+
+def test_an_operator_takes_what_it_is_given_and_the_rest_from_the_scene(walker, settings):
+    settings.smoothness = 0.5
+    assert OPS.learn(n_segments=3) == {"FINISHED"}
+    assert settings.n_segments == 3
+    assert settings.smoothness == 0.5
+    assert labels_of(walker).max() == 2
+
+
+# When nothing follows
+
+
+def test_nothing_follows_when_it_is_off_and_update_does_it(walker, settings, session):
+    before = labels_of(walker)
+    settings.live = False
+    settings.n_segments = 2
+    assert not bpy.app.timers.is_registered(session.timer)
+    np.testing.assert_array_equal(labels_of(walker), before)
+    assert OPS.update() == {"FINISHED"}
+    assert set(labels_of(walker)) == {0, 1}
+
+
+def test_nothing_follows_by_itself_where_it_takes_long(walker, settings, session, monkeypatch):
+    session.work.report.seconds["label"] = 6.0
+    settings.n_segments = 2
+    assert not bpy.app.timers.is_registered(session.timer)
+    assert OPS.update() == {"FINISHED"}
+    assert set(labels_of(walker)) == {0, 1}
+
+
+def test_settings_that_come_to_rest_are_waited_for(walker, settings, session):
+    settings.n_segments = 2
+    assert bpy.app.timers.is_registered(session.timer)
+    assert 0 < session.tick() <= module.REST
+    assert labels_of(walker).max() == 3
+    bpy.app.timers.unregister(session.timer)
+
+
+def test_an_edited_mesh_is_left_alone(walker, settings, session):
+    walker.data.vertices[3].co.z += 0.1
+    before = snapshot(walker.data)
+    settings.n_segments = 2
+    rest(session)
+    assert not changes(before, snapshot(walker.data))
+    assert 'the mesh of "Walker" was edited' in session.said
+    assert session.work is None
+
+
+def test_a_removed_object_is_forgotten(walker, settings, session):
+    bpy.data.objects.remove(walker)
+    settings.n_segments = 2
+    rest(session)
+    assert '"Walker" was deleted' in session.said
+    assert session.work is None
+
+
+def test_in_edit_mode_nothing_follows_until_it_is_left(walker, settings, session):
+    bpy.ops.object.mode_set(mode="EDIT")
+    settings.n_segments = 2
+    rest(session)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert labels_of(walker).max() == 3
+    assert OPS.update() == {"FINISHED"}
+    assert set(labels_of(walker)) == {0, 1}
+
+
+@pytest.mark.parametrize("how", ["clear", "load_model"])
+def test_after_clear_or_another_model_nothing_follows(walker, settings, session, tmp_path, how):
+    OPS.save_model(filepath=str(tmp_path / "model.json"))
+    if how == "clear":
+        OPS.clear()
+    else:
+        OPS.load_model(filepath=str(tmp_path / "model.json"))
+    before = snapshot(walker.data)
+    settings.n_segments = 2
+    rest(session)
+    assert not changes(before, snapshot(walker.data))
+
+
+def test_another_file_forgets_the_work(walker, session, tmp_path):
+    path = str(tmp_path / "kept.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert session.work is None
+    bpy.context.scene.wks_segment.n_segments = 2
+    rest(session)
+    assert labels_of(bpy.data.objects["Walker"]).max() == 3
+    assert not OPS.update.poll()
+
+
+def test_the_papers_setting_cannot_be_cut_otherwise_but_smoothed_settings_hold(session, settings):
+    obj = limbed_rigged()
+    select(obj)
+    settings.source, settings.pose_count, settings.preset = "FRAMES", 2, "paper"
+    assert OPS.learn() == {"FINISHED"}
+    before = labels_of(obj)
+    settings.n_segments = 3
+    rest(session)
+    np.testing.assert_array_equal(labels_of(obj), before)
+    assert "takes a new Learn and Segment" in session.said
+
+
+def test_what_is_too_large_is_not_kept(session, settings, monkeypatch):
+    monkeypatch.setattr(module, "MOST_BYTES", 1000)
+    obj = limbed_rigged()
+    select(obj)
+    settings.source, settings.pose_count = "FRAMES", 2
+    assert OPS.learn() == {"FINISHED"}
+    assert session.work is None
+    assert coordinates(obj.data).shape[1] == 3
+    assert not OPS.update.poll()

@@ -1,0 +1,73 @@
+from dataclasses import replace
+
+import numpy as np
+from shapes import creature, icosphere, together
+
+from wks_segment.core import TriangleMesh, prepare_surface
+from wks_segment.core.geometry.normalized_cuts import normalized_cut
+from wks_segment.core.learning.merge_tree import Ground
+
+
+def dumbbell(rings=60, around=40):
+    """Two balls of radius 1 that are grown together by a neck of radius 0.35."""
+    x = -2 * np.cos(np.linspace(0, np.pi, rings + 2))[1:-1]
+    radius = np.maximum(np.sqrt(np.maximum(1 - (np.abs(x) - 1) ** 2, 0)), np.where(np.abs(x) < 1, 0.35, 0))
+    turn = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    y, z = np.outer(radius, np.cos(turn)), np.outer(radius, np.sin(turn))
+    tube = np.stack([np.repeat(x, around), y.ravel(), z.ravel()])
+    faces = []
+    for i in range(rings - 1):
+        a, b = i * around + np.arange(around), i * around + (np.arange(around) + 1) % around
+        faces += [np.stack([a, b, b + around], axis=1), np.stack([a, b + around, a + around], axis=1)]
+    first, last = np.arange(around), (rings - 1) * around + np.arange(around)
+    poles = rings * around, rings * around + 1
+    faces.append(np.stack([np.full(around, poles[0]), np.roll(first, -1), first], axis=1))
+    faces.append(np.stack([np.full(around, poles[1]), last, np.roll(last, -1)], axis=1))
+    return TriangleMesh(np.concatenate([tube.T, [(-2, 0, 0), (2, 0, 0)]]), np.concatenate(faces))
+
+
+def test_patches_grow_together_across_what_is_not_a_border():
+    # Six squares in a row; between the third and the fourth a crease.
+    pairs = np.stack([np.arange(5), np.arange(1, 6)], axis=1)
+    borders = 0.4 * np.array([1, 1, 0.01, 1, 1])
+    areas = np.full(6, 1 / 6)
+    np.testing.assert_array_equal(normalized_cut(np.arange(6), areas, pairs, borders, 0.1), [0, 0, 0, 1, 1, 1])
+    assert normalized_cut(np.arange(6), areas, pairs, borders, 0.0).max() == 0
+    assert normalized_cut(np.arange(6), areas, pairs, borders, 100.0).max() == 5
+
+
+def test_thousands_of_loose_patches_are_no_table_of_all_with_all():
+    # 20,000 pairs of patches, each pair by itself: all with all would be 12 GB.
+    n = 20_000
+    pairs = np.arange(2 * n).reshape(n, 2)
+    borders = np.where(np.arange(n) % 2, 0.01, 0.0)
+    found = normalized_cut(np.arange(2 * n), np.full(2 * n, 1 / (2 * n)), pairs, borders, 10.0)
+    together_ = found[pairs[:, 0]] == found[pairs[:, 1]]
+    np.testing.assert_array_equal(together_, borders > 0)
+    assert len(np.unique(found)) == 2 * n - np.count_nonzero(together_)
+
+
+def test_a_dumbbell_has_two_parts_that_meet_at_its_neck():
+    surface = prepare_surface(dumbbell())
+    part = Ground.of(surface).part[1]
+    x = surface.original.vertices[surface.original.faces].mean(axis=1)[:, 0]
+    left, right = np.unique(part[x < -0.3]), np.unique(part[x > 0.3])
+    assert len(left) == len(right) == 1
+    assert left != right
+
+
+def test_loose_parts_stay_apart():
+    body, ball = creature(0.3, 4), icosphere(2)
+    surface = prepare_surface(together(body, TriangleMesh(ball.vertices + 9, ball.faces)), pieces="separate")
+    for part in Ground.of(surface).part:
+        assert not set(part[: body.n_faces]) & set(part[body.n_faces :])
+
+
+def test_labels_are_compared_with_parts_as_people_are_with_each_other():
+    ground = Ground.of(prepare_surface(dumbbell()))
+    shares = ground.surface.original.face_areas / ground.surface.original.area
+    alone = replace(ground, part=ground.part[1:2])
+    assert alone.unlike_parts(ground.part[1]) < 1e-9
+    # All in one: wrong for each pair of faces that the parts keep apart.
+    apart = np.mean([1 - np.square(np.bincount(part, shares)).sum() for part in ground.part])
+    np.testing.assert_allclose(ground.unlike_parts(np.zeros(len(shares), dtype=int)), apart)

@@ -1,0 +1,130 @@
+"""Labels again, with other settings: the same as from the beginning, and another number of segments without a fit."""
+
+import numpy as np
+import pytest
+from shapes import figure
+
+from wks_segment.core import PoseSegmentation, Workpiece
+from wks_segment.core.labeling import labeler
+
+POSES = [figure(), figure(0.4, 0.1), figure(0.1, 0.5)]
+POLYGONS = [np.arange(POSES[0].n_faces) // 2] * len(POSES)
+SETTINGS = {"n_eigenpairs": 100, "n_energies": 60}
+
+
+@pytest.fixture(scope="module")
+def described():
+    return PoseSegmentation(6, **SETTINGS).describe_all(POSES)
+
+
+@pytest.fixture(scope="module")
+def model(described):
+    return PoseSegmentation(6, **SETTINGS).fit(described)
+
+
+def outcome(model, poses):
+    """All that a model says of poses."""
+    labels = model.segment_polygons(poses, POLYGONS, 0.01)
+    return [
+        labels,
+        model.polygon_sides(poses, POLYGONS, labels),
+        *(model.polygon_sides([pose], POLYGONS[:1], labels) for pose in poses),
+        *(model.predict_soft(pose) for pose in poses),
+        model.segment_regions(poses[0]),
+        model.segment_faces(poses[1]),
+        model.predict(poses[2]),
+    ]
+
+
+def test_labels_in_any_order_of_settings_are_those_from_the_beginning(model, described):
+    works = [Workpiece(pose) for pose in described]
+    copies = {}
+    for number, smoothness in ((6, 1.0), (3, 1.0), (3, 2.0), (9, 0.5), (6, 0.0), (6, 1.0), (3, 2.0)):
+        other = copies.setdefault((number, smoothness), model.with_segments(number))
+        other.smoothness = smoothness
+        for again, anew in zip(outcome(other, works), outcome(other, described), strict=True):
+            np.testing.assert_array_equal(again, anew)
+
+
+def test_marked_edges_and_the_smallest_part_count_again(model, described):
+    works = [Workpiece(pose) for pose in described]
+    ring = POSES[0].faces[:, 0] // 40
+    for marked in (None, np.stack([ring[:-1], ring[1:]], axis=1)):
+        for share in (0.0, 0.05, 0.0):
+            again, anew = (model.segment_polygons(of, POLYGONS, share, marked=marked) for of in (works, described))
+            np.testing.assert_array_equal(again, anew)
+
+
+def test_two_models_do_not_take_each_others_results(model, described):
+    works = [Workpiece(pose) for pose in described]
+    other = PoseSegmentation(6, **SETTINGS, covariance_type="full").fit(described)
+    for each in (model, other, model):
+        for again, anew in zip(outcome(each, works), outcome(each, described), strict=True):
+            np.testing.assert_array_equal(again, anew)
+
+
+def test_a_model_learned_from_workpieces_is_the_same(model, described):
+    again = PoseSegmentation(6, **SETTINGS).fit([Workpiece(pose) for pose in described])
+    assert again.to_json() == model.to_json()
+
+
+def test_where_all_components_would_be_too_many_numbers_labels_are_nearly_the_same(model, described, monkeypatch):
+    usual = model.segment_polygons(described, POLYGONS)
+    monkeypatch.setattr(labeler, "MOST_NUMBERS", 0)
+    assert (model.segment_polygons(described, POLYGONS) == usual).mean() > 0.999
+
+
+def test_another_number_of_segments_is_a_coarser_or_finer_cut(model, described):
+    before = model.to_json()
+    finest = model.with_segments(10).predict(described[0])
+    for number in (2, 4, 6):
+        coarse = model.with_segments(number).predict_proba(described[0])
+        assert coarse.shape[1] == number
+        # Groups of groups: what is one segment among many is in one among few, where it is the likeliest in both.
+        counts = np.zeros((10, number))
+        np.add.at(counts, (finest, coarse.argmax(axis=1)), 1)
+        assert counts.max(axis=1).sum() > 0.9 * counts.sum()
+    assert model.to_json() == before
+
+
+def test_the_number_that_was_learned_is_the_model_itself(model, described):
+    again = model.with_segments(4).with_segments(6, described)
+    assert again.to_json() == model.to_json()
+    np.testing.assert_array_equal(again.predict(described[0]), model.predict(described[0]))
+
+
+def test_regions_are_those_of_the_new_number_where_poses_are_given(model, described):
+    few = model.with_segments(2, described)
+    assert few.regions_.n_groups == 2
+    assert model.regions_.n_groups > 2
+    assert model.with_segments(2).regions_ is model.regions_
+    fitted = PoseSegmentation(2, **SETTINGS).fit(described)
+    assert few.grouping_.number_of_wholes(2) == fitted.regions_.n_groups
+
+
+def test_sides_are_told_with_the_regions_that_were_learned(model, described):
+    few, faces = model.with_segments(4), np.arange(POSES[0].n_faces)
+    for pose in described:
+        labels = few.segment_polygons([pose], [faces])
+        side = few.polygon_sides([pose], [faces], labels)
+        np.testing.assert_array_equal(side, model.polygon_sides([pose], [faces], labels))
+        assert {-1, 1} <= set(side)
+
+
+def test_an_open_number_and_saving(model, described):
+    auto = model.with_segments("auto")
+    assert auto.n_segments_ == model.grouping_.best_number()
+    read = PoseSegmentation.from_json(auto.to_json())
+    np.testing.assert_array_equal(read.predict(described[1]), auto.predict(described[1]))
+
+
+def test_more_segments_than_components_and_the_papers_setting_are_refused(model, described):
+    with pytest.raises(ValueError, match=r"n_segments is 25, but the model has 24 components: fit a new model"):
+        model.with_segments(25)
+    with pytest.raises(ValueError, match="n_segments must be a whole number"):
+        model.with_segments(0)
+    paper = PoseSegmentation(4, **SETTINGS, preset="paper").fit(described)
+    with pytest.raises(ValueError, match="with the paper's setting each component is a segment"):
+        paper.with_segments(3)
+    with pytest.raises(ValueError, match="not fitted"):
+        PoseSegmentation(4).with_segments(3)

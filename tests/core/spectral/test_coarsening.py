@@ -1,0 +1,81 @@
+import numpy as np
+import pytest
+from scipy.sparse import csr_matrix
+from shapes import creature, grid, icosphere, together
+
+from wks_segment.core import TriangleMesh, stiffness_matrix
+from wks_segment.core.spectral.coarsening import HEAVIEST, Level, _components, cluster, coarse_eigenpairs, edges_of
+
+
+def unit_area(mesh):
+    return TriangleMesh(mesh.vertices / np.sqrt(mesh.area), mesh.faces)
+
+
+def cells_of(mesh, n_cells):
+    edges = edges_of(csr_matrix(stiffness_matrix(mesh)))
+    return (*cluster(mesh.vertices, edges, mesh.vertex_areas, n_cells), edges)
+
+
+@pytest.mark.parametrize("mesh", [icosphere(4), creature(0.4), grid(50, 40)], ids=["sphere", "limbs", "rectangle"])
+def test_cells_are_many_enough_connected_and_not_heavy(mesh):
+    mesh = unit_area(mesh)
+    cell, count, (a, b) = cells_of(mesh, 200)
+    assert 150 < count < 600
+    mass = np.bincount(cell, weights=mesh.vertex_areas)
+    assert mass.max() <= HEAVIEST / 200 + mesh.vertex_areas.max()
+    inside = cell[a] == cell[b]
+    assert _components(a[inside], b[inside], mesh.n_vertices)[1] == count
+
+
+def test_sheets_that_lie_close_have_cells_of_their_own():
+    lower, upper = grid(30, 30), grid(30, 30)
+    mesh = unit_area(together(lower, TriangleMesh(upper.vertices + (0, 0, 1e-3), upper.faces)))
+    cell, _, _ = cells_of(mesh, 100)
+    assert not set(cell[: lower.n_vertices]) & set(cell[lower.n_vertices :])
+
+
+@pytest.mark.parametrize("wide", [False, True])
+def test_prolongation_carries_constants_everywhere_and_slopes_inside_a_plane(wide):
+    mesh = unit_area(grid(60, 60))
+    prolongation, cells = Level.of(mesh).coarsened(150, wide)
+    np.testing.assert_allclose(prolongation @ np.ones(prolongation.shape[1]), 1.0, atol=1e-5)
+    inside = (np.abs(mesh.vertices[:, :2] - mesh.vertices[:, :2].mean(axis=0)) < 0.3).all(axis=1)
+    for axis in range(2):
+        carried = prolongation @ cells.positions[:, axis]
+        np.testing.assert_allclose(carried[inside], mesh.vertices[inside, axis], atol=2e-3)
+
+
+def test_prolongation_does_not_depend_on_the_orientation_of_faces():
+    mesh = unit_area(creature(0.4))
+    turned = mesh.faces.copy()
+    turned[::2] = turned[::2, ::-1]
+    one, other = (Level.of(m).coarsened(300)[0] for m in (mesh, TriangleMesh(mesh.vertices, turned)))
+    np.testing.assert_allclose(one.toarray(), other.toarray(), atol=1e-5)
+
+
+def test_a_level_of_cells_has_the_area_and_nearly_the_energy_of_the_surface():
+    mesh = unit_area(creature(0.4, 5))
+    level = Level.of(mesh)
+    prolongation, cells = level.coarsened(2000)
+    assert cells.areas.sum() == pytest.approx(1)
+    assert cells.mass.sum() == pytest.approx(1, rel=1e-5)
+    for axis in range(3):
+        here, there = mesh.vertices[:, axis], cells.positions[:, axis]
+        assert there @ cells.stiffness @ there == pytest.approx(here @ level.stiffness @ here, rel=0.03)
+        difference = prolongation @ there - here
+        assert difference @ level.stiffness @ difference < 0.03 * (here @ level.stiffness @ here)
+
+
+def test_coarse_eigenvalues_are_upper_bounds_and_near():
+    mesh = unit_area(icosphere(5))
+    _, cells = Level.of(mesh).coarsened(400, wide=True)
+    values, vectors = coarse_eigenpairs(cells, 1, 24)
+    expected = 4 * np.pi * np.repeat([2, 6, 12, 20], [3, 5, 7, 9])
+    np.testing.assert_allclose(values, expected, rtol=0.02)
+    assert (values > 0.998 * expected).all()
+    np.testing.assert_allclose(vectors.T @ (cells.mass @ vectors), np.eye(24), atol=1e-4)
+
+
+def test_a_tiny_surface_still_works():
+    prolongation, _ = Level.of(unit_area(icosphere(0))).coarsened(4)
+    np.testing.assert_allclose(prolongation @ np.ones(prolongation.shape[1]), 1.0, atol=1e-5)

@@ -1,0 +1,51 @@
+import numpy as np
+import pytest
+from scipy.sparse import csr_matrix, diags
+from shapes import creature, grid, icosphere, together
+
+from wks_segment.core import stiffness_matrix
+from wks_segment.core.spectral.multifrontal import NestedDissectionFactor, SingularError
+
+MESHES = [icosphere(4), grid(40, 30), creature(0.5, 4), together(icosphere(2), grid(9, 9)), icosphere(1)]
+IDS = ["sphere", "rectangle", "creature", "two parts", "smaller than a leaf"]
+
+
+def shifted(mesh, shift):
+    return csr_matrix(stiffness_matrix(mesh) + shift * diags(mesh.vertex_areas / mesh.area))
+
+
+@pytest.mark.parametrize("mesh", MESHES, ids=IDS)
+@pytest.mark.parametrize(("dtype", "tolerance"), [(np.float64, 1e-11), (np.float32, 1e-3)])
+def test_it_solves(mesh, dtype, tolerance):
+    matrix = shifted(mesh, 100.0)
+    right = np.random.default_rng(0).standard_normal((mesh.n_vertices, 7))
+    solution = NestedDissectionFactor(matrix, mesh.vertices, dtype).solve(right)
+    assert solution.dtype == dtype
+    np.testing.assert_allclose(matrix @ solution, right, atol=tolerance)
+
+
+@pytest.mark.parametrize("mesh", MESHES, ids=IDS)
+def test_an_indefinite_matrix_is_solved_and_its_negative_eigenvalues_are_counted(mesh):
+    right = np.random.default_rng(0).standard_normal((mesh.n_vertices, 7))
+    for shift in (-50.0, -600.0):
+        matrix = shifted(mesh, shift)
+        factor = NestedDissectionFactor(matrix, mesh.vertices, np.float64)
+        assert factor.n_negative == (np.linalg.eigvalsh(matrix.toarray()) < 0).sum() > 0
+        np.testing.assert_allclose(matrix @ factor.solve(right), right, atol=1e-8)
+
+
+def test_a_positive_definite_matrix_has_no_negative_eigenvalue():
+    mesh = creature(0.5, 4)
+    assert NestedDissectionFactor(shifted(mesh, 100.0), mesh.vertices).n_negative == 0
+
+
+def test_a_singular_matrix_is_refused():
+    with pytest.raises(SingularError, match="no inverse"):
+        NestedDissectionFactor(csr_matrix((5, 5)), np.zeros((5, 3)))
+
+
+def test_points_at_one_place_do_not_matter():
+    mesh = icosphere(3)
+    matrix = shifted(mesh, 100.0)
+    solution = NestedDissectionFactor(matrix, np.zeros((mesh.n_vertices, 3)), np.float64).solve(np.eye(mesh.n_vertices))
+    np.testing.assert_allclose(matrix @ solution, np.eye(mesh.n_vertices), atol=1e-9)

@@ -1,0 +1,68 @@
+"""Progress and tables on a terminal."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TextIO
+
+from ...core.poses.describe import Progress
+
+
+@contextmanager
+def terminal_progress() -> Iterator[Progress]:
+    """A progress bar on standard error where a person watches and rich is there, else a line a stage."""
+    try:
+        from rich.console import Console
+        from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+        from rich.progress import Progress as Bar
+    except ImportError:  # inside Blender: the extension carries no wheel just for this
+        yield _lines
+        return
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield _lines
+        return
+    columns = (TextColumn("{task.description:<44}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with Bar(*columns, console=console) as bar:
+        task = bar.add_task("", total=1.0)
+
+        def progress(stage: str, fraction: float) -> None:
+            bar.update(task, description=stage, completed=fraction)
+
+        yield progress
+        bar.update(task, description="Done", completed=1.0)
+
+
+def _lines(stage: str, fraction: float) -> None:
+    print(f"{round(100 * fraction):3d} %  {stage}", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def only_result_on_stdout() -> Iterator[TextIO]:
+    """Send what Blender prints to standard error, and give the real standard output for the result."""
+    sys.stdout.flush()
+    real = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        with os.fdopen(os.dup(real), "w", encoding="utf-8") as result:
+            yield result
+    finally:
+        sys.stdout.flush()
+        # What Blender printed may still wait in the C library, and would come out after the result.
+        ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None).fflush(None)
+        os.dup2(real, 1)
+        os.close(real)
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Text in columns: the first to the left, the others to the right."""
+    widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]
+
+    def line(cells: Sequence[str]) -> str:
+        return "  ".join([cells[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(cells[1:], widths[1:], strict=True))])
+
+    return "\n".join([line(header), "  ".join("─" * width for width in widths), *map(line, rows)])

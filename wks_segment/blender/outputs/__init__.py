@@ -1,0 +1,1 @@
+"""What is written to meshes, and taken back: labels, colors, materials, groups, images."""

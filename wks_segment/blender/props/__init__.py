@@ -1,0 +1,1 @@
+"""Properties of the extension: settings of a scene, rows of its lists, preferences, presets."""

@@ -1,0 +1,1 @@
+"""What is read from Blender: characters, poses, mesh arrays, files."""

@@ -1,0 +1,76 @@
+"""Whether what was read is still as it was, so that nothing is written to what is another mesh by now."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from hashlib import blake2b
+
+import bpy
+import numpy as np
+
+from ..errors import ChangedError
+from .characters import Character, Member
+
+
+class Watch:
+    """Remembers the meshes of characters as they are when it is made, and a scene; holds on to nothing of Blender's."""
+
+    def __init__(self, scene: bpy.types.Scene, characters: Iterable[Character]) -> None:
+        self._scene = scene.name, scene.session_uid
+        found = {member: member.found() for character in characters for member in character.members}
+        self._states = {member: (_state(obj), _content(obj.data)) for member, obj in found.items() if obj is not None}
+
+    def glance(self) -> None:
+        """Raise ChangedError, which says what happened, if a change is seen at a glance: for many times a second."""
+        self.scene()
+        for member, (state, _) in self._states.items():
+            _check(member, member.found(), state)
+
+    def look(self) -> None:
+        """The same for any change of coordinates or faces: for once, before something is written."""
+        self.glance()
+        for member, (_, content) in self._states.items():
+            obj = member.found()
+            if obj is not None and _content(obj.data) != content:
+                raise ChangedError(f'the mesh of "{member.name}" was edited')
+
+    def scene(self) -> bpy.types.Scene:
+        """The scene; ChangedError if it is gone."""
+        name, uid = self._scene
+        scene = bpy.data.scenes.get(name)
+        if scene is None or scene.session_uid != uid:
+            scene = next((other for other in bpy.data.scenes if other.session_uid == uid), None)
+        if scene is None:
+            raise ChangedError(f'the scene "{name}" was deleted')
+        return scene
+
+
+def _state(obj: bpy.types.Object) -> tuple[str, int, int]:
+    """Mode and numbers of vertices and polygons: what is cheap to ask."""
+    return obj.mode, len(obj.data.vertices), len(obj.data.polygons)
+
+
+def _check(member: Member, obj: bpy.types.Object | None, state: tuple[str, int, int]) -> None:
+    if obj is None:
+        raise ChangedError(f'"{member.name}" was deleted')
+    if obj.data.session_uid != member.mesh_uid:
+        raise ChangedError(f'"{member.name}" got another mesh')
+    mode, *size = _state(obj)
+    if mode != state[0]:
+        raise ChangedError(f'"{member.name}" went into {mode.replace("_", " ").title()} Mode')
+    if tuple(size) != state[1:]:
+        raise ChangedError(f'the mesh of "{member.name}" was edited')
+
+
+def _content(mesh: bpy.types.Mesh) -> bytes:
+    """A number, as good as unique, for the coordinates and faces of a mesh."""
+    digest = blake2b(digest_size=16)
+    for collection, name, width, dtype in (
+        (mesh.vertices, "co", 3, np.float32),
+        (mesh.loops, "vertex_index", 1, np.int32),
+        (mesh.polygons, "loop_total", 1, np.int32),
+    ):
+        values = np.empty(width * len(collection), dtype=dtype)
+        collection.foreach_get(name, values)
+        digest.update(values.tobytes())
+    return digest.digest()

@@ -1,0 +1,194 @@
+"""Which objects make up one character."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import bpy
+
+from ..errors import UserError
+
+CONVERTIBLE = {
+    "CURVE": "curve", "SURFACE": "surface", "FONT": "text", "META": "metaball", "CURVES": "hair object",
+    "POINTCLOUD": "point cloud", "VOLUME": "volume", "GREASEPENCIL": "Grease Pencil object",
+}  # fmt: skip
+"""Types of object that a mesh can be made of, and what artists call them."""
+
+
+@dataclass(frozen=True)
+class Member:
+    """How an object is found again, and its mesh told from another: by numbers that last as long as Blender runs."""
+
+    name: str
+    uid: int
+    mesh_uid: int
+
+    def found(self) -> bpy.types.Object | None:
+        """The object, under whatever name; None if it is gone, or is no mesh any more."""
+        obj = bpy.data.objects.get(self.name)
+        if obj is None or obj.session_uid != self.uid:
+            obj = next((other for other in bpy.data.objects if other.session_uid == self.uid), None)
+        return obj if obj is not None and obj.type == "MESH" else None
+
+
+@dataclass(frozen=True, init=False)
+class Character:
+    """One or several mesh objects that are one body, in the order of their names.
+
+    Holds on to nothing of Blender's, and so can be handed to a thread: what is there is looked up each time.
+
+    Attributes
+    ----------
+    name : str
+        Of the object, or of the armature that holds several together.
+    members
+        What the objects are found by.
+    """
+
+    name: str
+    members: tuple[Member, ...]
+
+    def __init__(self, objects: Sequence[bpy.types.Object]) -> None:
+        armature = armature_of(objects[0])
+        members = tuple(Member(obj.name, obj.session_uid, obj.data.session_uid) for obj in objects)
+        object.__setattr__(self, "name", objects[0].name if len(objects) == 1 or armature is None else armature.name)
+        object.__setattr__(self, "members", members)
+
+    @property
+    def objects(self) -> tuple[bpy.types.Object, ...]:
+        """The objects; not for a thread.
+
+        Raises
+        ------
+        UserError
+            If one is gone.
+        """
+        found = {member.name: member.found() for member in self.members}
+        gone = ", ".join(f'"{name}"' for name, obj in found.items() if obj is None)
+        if gone:
+            raise UserError(f"{gone} is gone")
+        return tuple(found.values())
+
+    @property
+    def meshes(self) -> tuple[int, ...]:
+        """What tells its meshes from those of another character; fit for a thread."""
+        return tuple(member.mesh_uid for member in self.members)
+
+    def frame_ranges(self) -> list[tuple[float, float]]:
+        """First and last frame of each action and unmuted NLA strip that moves the character now."""
+        ranges: list[tuple[float, float]] = []
+        for block in self.animated():
+            data = block.animation_data
+            if data is None:
+                continue
+            if data.action is not None:
+                ranges.append(tuple(data.action.frame_range))
+            for track in data.nla_tracks:
+                if not track.mute:
+                    ranges += [(strip.frame_start, strip.frame_end) for strip in track.strips if not strip.mute]
+        return ranges
+
+    def animated(self) -> list[bpy.types.ID]:
+        """Data-blocks whose animation moves the character: objects, armatures, shape keys."""
+        blocks: dict[bpy.types.ID, None] = {}
+        for obj in self.objects:
+            blocks |= dict.fromkeys(b for b in (armature_of(obj), obj, obj.data.shape_keys) if b is not None)
+        return list(blocks)
+
+
+def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
+    """The armature that deforms an object or that it hangs from, if any."""
+    for modifier in obj.modifiers:
+        if modifier.type == "ARMATURE" and modifier.object is not None:
+            return modifier.object
+    parent = obj.parent
+    while parent is not None:
+        if parent.type == "ARMATURE":
+            return parent
+        parent = parent.parent
+    return None
+
+
+def mesh_objects(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Those of the objects that hold a mesh and are not there only to draw a bone, by name."""
+    meshes = sorted((obj for obj in objects if obj.type == "MESH"), key=lambda obj: obj.name)
+    return [obj for obj in meshes if not _draws_a_bone(obj)]
+
+
+def selected_meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The selected mesh objects, by name, and the visible ones on a selected armature if none of these is selected.
+
+    Who clicks on a character often gets its bones.
+    """
+    return mesh_objects(with_rigged(context.selected_objects, context.visible_objects))
+
+
+def with_rigged(selected: Iterable[bpy.types.Object], visible: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+    """The selected mesh objects, and those of the visible ones that a selected armature stands for."""
+    selected = list(selected)
+    chosen = [obj for obj in selected if obj.type == "MESH"]
+    rigs = {obj for obj in selected if obj.type == "ARMATURE"}
+    if rigs:
+        rigs -= {armature_of(obj) for obj in chosen}
+        chosen += [obj for obj in visible if obj.type == "MESH" and armature_of(obj) in rigs]
+    return chosen
+
+
+def why_no_mesh(objects: Iterable[bpy.types.Object]) -> str:
+    """What to do to get a mesh, if none of the objects is one."""
+    for obj in objects:
+        if obj.type in CONVERTIBLE:
+            return f'"{obj.name}" is a {CONVERTIBLE[obj.type]}: convert it first (Object > Convert > Mesh)'
+        if obj.type == "EMPTY" and obj.instance_type == "COLLECTION":
+            return f'"{obj.name}" is an instance: make it real first (Object > Apply > Make Instances Real)'
+    return "Select the mesh of a character first"
+
+
+def _draws_a_bone(obj: bpy.types.Object) -> bool:
+    """Whether an object only shows the bones of a rig, as importers add them: alone, and the shape of a bone."""
+    if obj.parent is not None or obj.modifiers:
+        return False
+    rigs = [other for other in bpy.data.objects if other.type == "ARMATURE" and other.pose is not None]
+    return any(bone.custom_shape == obj for rig in rigs for bone in rig.pose.bones)
+
+
+def group(objects: Sequence[bpy.types.Object], together: bool = False) -> list[Character]:
+    """Characters that mesh objects make up: those on one armature or parented to each other are one.
+
+    Parameters
+    ----------
+    objects
+        Mesh objects.
+    together
+        Take all of them as one character.
+
+    Raises
+    ------
+    UserError
+        If there is no object, or one belongs to a linked library and cannot be written to.
+    """
+    if not objects:
+        raise UserError("No mesh object to work on: select the character's mesh")
+    for obj in objects:
+        if obj.library is not None or obj.data.library is not None:
+            raise UserError(f'"{obj.name}" is linked from another file: make it local first (Object > Relations)')
+        if obj.mode == "EDIT":
+            raise UserError(f'"{obj.name}" is in Edit Mode: leave it first (Tab)')
+    if together:
+        return [Character(tuple(objects))]
+    by_body: dict[bpy.types.Object, list[bpy.types.Object]] = {}
+    for obj in objects:
+        by_body.setdefault(_body_of(obj, set(objects)), []).append(obj)
+    return [Character(tuple(members)) for members in by_body.values()]
+
+
+def _body_of(obj: bpy.types.Object, among: set[bpy.types.Object]) -> bpy.types.Object:
+    """What an object belongs to: its armature, the topmost of its parents that is among the objects, or itself."""
+    armature = armature_of(obj)
+    if armature is not None:
+        return armature
+    body, parent = obj, obj.parent
+    while parent is not None:
+        body, parent = (parent if parent in among else body), parent.parent
+    return body if body is obj else _body_of(body, among)

@@ -1,0 +1,111 @@
+"""Opens and saves files in the formats that Blender's own importers and exporters know."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import bpy
+
+from ..errors import UserError
+
+
+def _import_fbx(path: str) -> None:
+    if "fbx_import" in dir(bpy.ops.wm):  # from 4.5 on; hasattr is true of any name
+        bpy.ops.wm.fbx_import(filepath=path)
+    else:
+        bpy.ops.import_scene.fbx(filepath=path)
+
+
+def _append_blend(path: str) -> None:
+    """Append all objects of a .blend file, linked into the scene."""
+    with bpy.data.libraries.load(path) as (source, target):
+        target.objects = source.objects
+    for obj in target.objects:
+        if obj is not None:
+            bpy.context.scene.collection.objects.link(obj)
+
+
+IMPORTERS: dict[str, Callable[[str], object]] = {
+    ".blend": _append_blend,
+    ".glb": lambda path: bpy.ops.import_scene.gltf(filepath=path),
+    ".gltf": lambda path: bpy.ops.import_scene.gltf(filepath=path),
+    ".obj": lambda path: bpy.ops.wm.obj_import(filepath=path),
+    ".ply": lambda path: bpy.ops.wm.ply_import(filepath=path),
+    ".stl": lambda path: bpy.ops.wm.stl_import(filepath=path),
+    ".fbx": _import_fbx,
+    ".abc": lambda path: bpy.ops.wm.alembic_import(filepath=path, as_background_job=False),
+    ".usd": lambda path: bpy.ops.wm.usd_import(filepath=path),
+    ".usdc": lambda path: bpy.ops.wm.usd_import(filepath=path),
+    ".usda": lambda path: bpy.ops.wm.usd_import(filepath=path),
+    ".usdz": lambda path: bpy.ops.wm.usd_import(filepath=path),
+}
+EXPORTERS: dict[str, Callable[[str], object]] = {
+    ".blend": lambda path: bpy.ops.wm.save_as_mainfile(filepath=path, copy=True),
+    ".glb": lambda path: bpy.ops.export_scene.gltf(filepath=path, export_vertex_color="ACTIVE"),
+    ".obj": lambda path: bpy.ops.wm.obj_export(filepath=path, export_colors=True),
+}
+
+
+def open_files(paths: list[Path]) -> list[list[bpy.types.Object]]:
+    """Read files into an empty scene; the objects that came from each.
+
+    A single .blend file is opened as it is, so that what is saved later is all of it.
+
+    Raises
+    ------
+    UserError
+        If a file does not exist, is of no known format, or cannot be read.
+    """
+    for path in paths:
+        if not path.is_file():
+            raise UserError(f"{path}: there is no such file")
+        if path.suffix.lower() not in IMPORTERS:
+            raise UserError(f"{path}: unknown format; known are {', '.join(IMPORTERS)}")
+    if len(paths) == 1 and paths[0].suffix.lower() == ".blend":
+        _try(lambda path: bpy.ops.wm.open_mainfile(filepath=path, load_ui=False), paths[0])
+        if bpy.context.object is not None and bpy.context.object.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        return [list(bpy.context.scene.objects)]
+    # Not read_factory_settings: that would disable the extension which this runs in.
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    return [_import(path) for path in paths]
+
+
+def _import(path: Path) -> list[bpy.types.Object]:
+    before = set(bpy.data.objects)
+    _try(IMPORTERS[path.suffix.lower()], path)
+    bpy.context.view_layer.update()
+    return [obj for obj in bpy.data.objects if obj not in before]
+
+
+def _try(reader: Callable[[str], object], path: Path) -> None:
+    try:
+        reader(str(path.resolve()))
+    except (RuntimeError, OSError) as error:
+        raise UserError(f"{path}: Blender cannot read it: {str(error).strip()}") from error
+
+
+def check_output(path: Path) -> None:
+    """UserError unless a scene can be written there, before the work begins."""
+    if path.suffix.lower() not in EXPORTERS:
+        raise UserError(f"{path}: unknown format to write; known are {', '.join(EXPORTERS)}")
+    check_folder(path)
+
+
+def check_folder(path: Path) -> None:
+    """UserError unless the folder of a file is there."""
+    if not path.resolve().parent.is_dir():
+        raise UserError(f"{path}: the folder {path.resolve().parent} does not exist")
+    if path.is_dir():
+        raise UserError(f"{path}: this is a folder, give the name of a file")
+
+
+def save_scene(path: Path) -> None:
+    """Write the scene to a file; UserError if it cannot be written."""
+    try:
+        EXPORTERS[path.suffix.lower()](str(path.resolve()))
+    except (RuntimeError, OSError) as error:
+        raise UserError(f"{path}: it could not be written: {str(error).strip()}") from error
+    if not path.is_file():
+        raise UserError(f"{path}: it could not be written")

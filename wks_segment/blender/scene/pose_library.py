@@ -1,0 +1,98 @@
+"""Reads the poses of a pose library: pose assets, or else actions, that move the bones of a character."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import bpy
+from mathutils import Matrix
+
+from ..errors import UserError
+from .characters import Character, armature_of
+from .poses import Pose, evenly, read_pose, with_rest
+
+BONE = re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]')
+"""The bone in the data path of an F-curve."""
+
+
+def read_actions(context: bpy.types.Context, character: Character, count: int) -> list[Pose]:
+    """A character in the poses of its library, at most `count` of them, evenly chosen; each from rest.
+
+    A pose asset is one pose, another action gives the one in its middle. The armature comes back as it was.
+
+    Raises
+    ------
+    UserError
+        If it has no armature, or no action in the file moves a bone of it.
+    """
+    armature = next((found for found in map(armature_of, character.objects) if found is not None), None)
+    if armature is None:
+        raise UserError(f'"{character.name}" has no armature that a pose could move: take poses from elsewhere')
+    actions = [action for action in bpy.data.actions if _bones(action) & set(armature.pose.bones.keys())]
+    actions = [action for action in actions if action.asset_data is not None] or actions
+    if not actions:
+        raise UserError(
+            f'There is no pose for "{armature.name}" in this file: create pose assets of it (Pose > Create Pose '
+            "Asset), or take poses from elsewhere"
+        )
+    poses = []
+    with _posable(context, armature):
+        for action in (actions[i] for i in evenly(0, len(actions) - 1, count)):
+            for bone in armature.pose.bones:
+                bone.matrix_basis = Matrix()
+            first, last = action.frame_range
+            frame = first if action.asset_data is not None else (first + last) / 2
+            armature.pose.apply_pose_from_action(action, evaluation_time=frame)
+            context.view_layer.update()
+            poses.append(read_pose(context, character, f"{character.name}, {action.name}"))
+    return with_rest(context, poses)
+
+
+def _bones(action: bpy.types.Action) -> set[str]:
+    """Names of the bones that an action moves."""
+    if bpy.app.version < (4, 4, 0):
+        curves = list(action.fcurves)
+    else:
+        bags = (bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags)
+        curves = [curve for bag in bags for curve in bag.fcurves]
+    found = (BONE.match(curve.data_path) for curve in curves)
+    return {bpy.utils.unescape_identifier(match[1]) for match in found if match is not None}
+
+
+@contextmanager
+def _posable(context: bpy.types.Context, armature: bpy.types.Object) -> Iterator[None]:
+    """While it lasts, no animation moves an armature; its pose comes back with all that is not keyed."""
+    data = armature.animation_data
+    if data is not None and data.use_tweak_mode:
+        raise UserError(f'"{armature.name}" is in tweak mode: leave it first (Tab in the Nonlinear Animation editor)')
+    animation = {name: getattr(data, name, None) for name in ("action", "action_slot", "use_nla")} if data else {}
+    before = [(bone, _state(bone), dict(bone.items())) for bone in armature.pose.bones]
+    try:
+        if data is not None:
+            data.action, data.use_nla = None, False
+        yield
+    finally:
+        for name, value in animation.items():
+            if value is not None:
+                setattr(data, name, value)
+        # What is keyed is evaluated now, so that it does not overwrite what follows.
+        context.view_layer.update()
+        for bone, state, properties in before:
+            for name, value in state.items():
+                setattr(bone, name, value)
+            for name, value in properties.items():
+                bone[name] = value
+        context.view_layer.update()
+
+
+def _state(bone: bpy.types.PoseBone) -> dict[str, Any]:
+    """All of a bone that can be animated; how it turns comes first, since Blender converts the others to that."""
+    state: dict[str, Any] = {"rotation_mode": bone.rotation_mode}
+    for prop in bone.bl_rna.properties:
+        if prop.is_animatable and not prop.is_readonly and prop.type in ("FLOAT", "INT", "BOOLEAN"):
+            value = getattr(bone, prop.identifier)
+            state[prop.identifier] = tuple(value) if prop.is_array else value
+    return {name: value for name, value in state.items() if not name.startswith("matrix")}

@@ -1,0 +1,77 @@
+"""The poses to learn from, as the settings say where they are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+
+from ..errors import UserError
+from ..props.settings import WKSSegmentSettings
+from ..workflow.report import Report, pose_warnings
+from . import poses as reader
+from .characters import Character, armature_of, group, selected_meshes
+from .pose_library import read_actions
+from .poses import Pose
+
+
+def read_training_poses(context: bpy.types.Context, settings: WKSSegmentSettings, report: Report) -> list[Pose]:
+    """Poses to learn from, as the settings say where they are.
+
+    Raises
+    ------
+    UserError
+        If there are none there, or they cannot be used.
+    """
+    characters = group(selected_meshes(context))
+    with report.stage("read"):
+        if settings.source == "OBJECTS":
+            poses = reader.read_objects(context, characters)
+        else:
+            character = active_character(context, characters)
+            if settings.source == "SHAPE_KEYS":
+                poses = reader.read_shape_keys(context, character, settings.pose_count)
+            elif settings.source == "MARKERS":
+                poses = reader.read_markers(context, character, settings.pose_count)
+            elif settings.source == "ACTIONS":
+                poses = read_actions(context, character, settings.pose_count)
+            else:
+                frames = chosen_frames(context.scene, character, settings)
+                poses = reader.read_frames(context, character, frames)
+    report.poses = poses
+    report.warnings += pose_warnings(poses, settings.source in ("FRAMES", "MARKERS"))
+    return poses
+
+
+def active_character(context: bpy.types.Context, characters: Sequence[Character]) -> Character:
+    """The one among the selected characters that the active object is of, or the only one.
+
+    Raises
+    ------
+    UserError
+        If there are several and the active object is of none.
+    """
+    active = context.active_object
+    for character in characters:
+        members = (*character.objects, armature_of(character.objects[0]))
+        if len(characters) == 1 or (active is not None and active in members):
+            return character
+    names = ", ".join(character.name for character in characters[:5])
+    raise UserError(f"{len(characters)} characters are selected ({names}): click the one whose poses are meant")
+
+
+def chosen_frames(scene: bpy.types.Scene, character: Character, settings: WKSSegmentSettings) -> list[int]:
+    """Frames to take poses from: of the user's range, of the character's own animation, or of the scene's range.
+
+    Raises
+    ------
+    UserError
+        If the user's range ends before it begins.
+    """
+    if not settings.use_frame_range:
+        return reader.own_frames(scene, character, settings.pose_count)
+    if settings.frame_last < settings.frame_first:
+        raise UserError(
+            f"The frame range ends ({settings.frame_last}) before it begins ({settings.frame_first}): swap them"
+        )
+    return reader.evenly(settings.frame_first, settings.frame_last, settings.pose_count)

@@ -1,0 +1,348 @@
+"""Reads poses: the surface of a character as the artist sees it, and the way back to the artist's own polygons."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core import TriangleMesh
+from ...core.mesh.triangle_mesh import FloatArray, IntArray, repeats_a_vertex
+from ..errors import UserError
+from .characters import Character, armature_of
+
+ORIGIN = ".wks_segment_origin"
+"""Temporary face attribute: modifiers that make new faces copy it from the face that they make them of."""
+DEFORMING = frozenset({
+    "ARMATURE", "CAST", "CLOTH", "CORRECTIVE_SMOOTH", "CURVE", "DISPLACE", "HOOK", "LAPLACIANDEFORM", "LATTICE",
+    "MESH_CACHE", "MESH_DEFORM", "MESH_SEQUENCE_CACHE", "NORMAL_EDIT", "SHRINKWRAP", "SIMPLE_DEFORM", "SMOOTH",
+    "LAPLACIANSMOOTH", "SOFT_BODY", "SURFACE_DEFORM", "WARP", "WAVE", "WEIGHTED_NORMAL",
+})  # fmt: skip
+"""Modifiers that only move vertices: behind them a face is the face that it was."""
+SAME_SURFACE = 1e-5
+"""Two poses that differ by less than this fraction of the size are one and the same."""
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A character in one pose.
+
+    Attributes
+    ----------
+    name : str
+        As an artist would call it: the object, the frame, the shape key.
+    character : Character
+    mesh : TriangleMesh
+        All objects of the character as they are seen, in world space.
+    polygon_of : (m,) int array
+        The polygon that each triangle comes from; the polygons of all objects are numbered one object after another.
+        -1: a modifier made it of nothing of the character's own.
+    vertex_of : (n,) int array
+        The character's own vertex that each vertex is, numbered in the same way; -1 where modifiers change faces, so
+        that only `polygon_of` tells what is where.
+    axes : (3, 3) array
+        Columns: the character's own x, y and z in world space. x points to its left.
+    rest : TriangleMesh, optional
+        The same triangles in the rest position of the character's armature, if it has one: where the artist put loose
+        parts together. The axes are then those that it has there.
+    """
+
+    name: str
+    character: Character
+    mesh: TriangleMesh
+    polygon_of: IntArray
+    vertex_of: IntArray
+    axes: FloatArray
+    rest: TriangleMesh | None = None
+
+    @property
+    def upright(self) -> TriangleMesh:
+        """The rest position, or the pose where there is none, as the character itself sees it: x points to its left."""
+        mesh = self.mesh if self.rest is None else self.rest
+        return TriangleMesh(mesh.vertices @ self.axes, mesh.faces)
+
+    def is_like(self, other: Pose) -> bool:
+        """Whether the other pose is the same surface at the same place."""
+        a, b = self.mesh.vertices, other.mesh.vertices
+        return (
+            self.is_mesh_of(other)
+            and bool(np.abs(a - b).max() <= SAME_SURFACE * np.ptp(a, axis=0).max())
+            and np.array_equal(self.polygon_of, other.polygon_of)
+        )
+
+    def is_mesh_of(self, other: Pose) -> bool:
+        """Whether the other pose has the same triangles between as many vertices."""
+        return self.mesh.n_vertices == other.mesh.n_vertices and np.array_equal(self.mesh.faces, other.mesh.faces)
+
+    def cut_as(self, other: Pose) -> Pose:
+        """The pose with the triangles of another one, if they are of the same polygons; else as it is.
+
+        Blender cuts a polygon that is not flat in one way here and in another way there.
+        """
+        if self.is_mesh_of(other) or not self._has_polygons_of(other):
+            return self
+        rest = None if self.rest is None else TriangleMesh(self.rest.vertices, other.mesh.faces)
+        return replace(self, mesh=TriangleMesh(self.mesh.vertices, other.mesh.faces), rest=rest)
+
+    def _has_polygons_of(self, other: Pose) -> bool:
+        """Whether the other pose has the same polygons between as many vertices, however they are cut."""
+        count = self.mesh.n_vertices
+        if count != other.mesh.n_vertices or not np.array_equal(self.polygon_of, other.polygon_of):
+            return False
+        ours, theirs = (np.unique(np.repeat(p.polygon_of, 3) * count + p.mesh.faces.ravel()) for p in (self, other))
+        return np.array_equal(ours, theirs)
+
+
+def polygon_ranges(character: Character) -> list[tuple[bpy.types.Object, slice]]:
+    """Each object with its polygons' place in the character's numbering."""
+    return _ranges(character, "polygons")
+
+
+def vertex_ranges(character: Character) -> list[tuple[bpy.types.Object, slice]]:
+    """Each object with its vertices' place in the character's numbering."""
+    return _ranges(character, "vertices")
+
+
+def _ranges(character: Character, of: str) -> list[tuple[bpy.types.Object, slice]]:
+    ends = np.cumsum([len(getattr(obj.data, of)) for obj in character.objects]).tolist()
+    starts = [0, *ends[:-1]]
+    return [(obj, slice(a, b)) for obj, a, b in zip(character.objects, starts, ends, strict=True)]
+
+
+def read_objects(context: bpy.types.Context, characters: Sequence[Character]) -> list[Pose]:
+    """Each character as it is now, one pose each."""
+    return in_one_cut(
+        [with_rest(context, [read_pose(context, character, character.name)])[0] for character in characters]
+    )
+
+
+def read_frames(
+    context: bpy.types.Context, character: Character, frames: Sequence[int], names: Sequence[str] | None = None
+) -> list[Pose]:
+    """One character at frames of its animation, by these names; the scene comes back to its own frame."""
+    scene = context.scene
+    before, subframe = scene.frame_current, scene.frame_subframe
+    try:
+        poses = []
+        for frame, name in zip(frames, names or [f"frame {frame}" for frame in frames], strict=True):
+            scene.frame_set(frame)
+            poses.append(read_pose(context, character, f"{character.name}, {name}"))
+        return with_rest(context, poses)
+    finally:
+        scene.frame_set(before, subframe=subframe)
+
+
+def read_markers(context: bpy.types.Context, character: Character, count: int) -> list[Pose]:
+    """One character at the frames of the timeline's markers, at most `count` of them, evenly chosen.
+
+    Raises
+    ------
+    UserError
+        If there are no markers.
+    """
+    names: dict[int, str] = {}
+    for marker in sorted(context.scene.timeline_markers, key=lambda marker: marker.frame):
+        names.setdefault(marker.frame, marker.name)
+    if not names:
+        raise UserError("There are no markers in the timeline: add some (M), or take poses from elsewhere")
+    frames = [list(names)[i] for i in evenly(0, len(names) - 1, count)]
+    return read_frames(context, character, frames, [names[frame] for frame in frames])
+
+
+def read_shape_keys(context: bpy.types.Context, character: Character, count: int) -> list[Pose]:
+    """A character in its shape keys, at most `count` of them, evenly chosen; each alone at its full value.
+
+    A key moves all objects of the character that have one of its name; the others show their basis.
+
+    Raises
+    ------
+    UserError
+        If there are no shape keys beside the basis, or all are muted.
+    """
+    keyed = [obj for obj in character.objects if obj.data.shape_keys is not None]
+    names = list(
+        dict.fromkeys(block.name for obj in keyed for block in obj.data.shape_keys.key_blocks if not block.mute)
+    )
+    if len(names) < 2:
+        raise UserError(
+            f'"{character.name}" has no shape keys that are not muted: add some, or take poses from elsewhere'
+        )
+    before = [(obj, obj.active_shape_key_index, obj.show_only_shape_key) for obj in keyed]
+    try:
+        poses = []
+        for name in (names[i] for i in evenly(0, len(names) - 1, count)):
+            for obj in keyed:
+                obj.show_only_shape_key = True
+                obj.active_shape_key_index = max(obj.data.shape_keys.key_blocks.find(name), 0)
+            poses.append(read_pose(context, character, f"{character.name}, {name}"))
+        return with_rest(context, poses)
+    finally:
+        for obj, active, pinned in before:
+            obj.active_shape_key_index, obj.show_only_shape_key = active, pinned
+
+
+def evenly(first: int, last: int, count: int) -> list[int]:
+    """At most `count` different whole numbers from first to last, in equal steps from end to end."""
+    return np.unique(np.linspace(first, last, max(count, 1)).round().astype(int)).tolist()
+
+
+def own_frames(scene: bpy.types.Scene, character: Character, count: int) -> list[int]:
+    """At most `count` frames spread over a character's own animation, or over the scene's range if it has none.
+
+    From the middles of equal spans, since the first and the last frame of a cycle are the same pose.
+    """
+    ranges = character.frame_ranges() or [(scene.frame_start, scene.frame_end)]
+    first, last = min(first for first, _ in ranges), max(last for _, last in ranges)
+    middles = first + (np.arange(count) + 0.5) * (last - first) / count
+    return np.unique(middles.round().astype(int)).tolist()
+
+
+def in_one_cut(poses: Sequence[Pose]) -> list[Pose]:
+    """Poses, those that are of the same polygons with the same triangles."""
+    cut: list[Pose] = []
+    for pose in poses:
+        like = (pose.cut_as(other) for other in cut)
+        cut.append(next((found for found, other in zip(like, cut, strict=True) if found.is_mesh_of(other)), pose))
+    return cut
+
+
+def with_rest(context: bpy.types.Context, poses: list[Pose]) -> list[Pose]:
+    """Poses of one character together with its rest position, where its armature has one of the same polygons."""
+    poses = in_one_cut(poses)
+    character = poses[0].character
+    armatures = dict.fromkeys(obj.data for obj in map(armature_of, character.objects) if obj is not None)
+    if not armatures:
+        return poses
+    before = {armature: armature.pose_position for armature in armatures}
+    try:
+        for armature in armatures:
+            armature.pose_position = "REST"
+        rest = read_pose(context, character, f"{character.name}, rest position").cut_as(poses[0])
+    finally:
+        for armature, position in before.items():
+            armature.pose_position = position
+        context.view_layer.update()
+    return [replace(pose, rest=rest.mesh, axes=rest.axes) if pose.is_mesh_of(rest) else pose for pose in poses]
+
+
+def read_pose(context: bpy.types.Context, character: Character, name: str) -> Pose:
+    """A character as it is seen now: modifiers, armature and shape keys applied, in world space.
+
+    Raises
+    ------
+    UserError
+        If an object has no faces, a modifier hides where its faces come from, or a coordinate is not finite.
+    """
+    vertices: list[FloatArray] = []
+    triangles: list[IntArray] = []
+    owners: list[IntArray] = []
+    own: list[IntArray] = []
+    n_vertices = 0
+    with _marked_origins(character) as origins:
+        depsgraph = context.evaluated_depsgraph_get()
+        for (obj, polygons), (_, its) in zip(polygon_ranges(character), vertex_ranges(character), strict=True):
+            points, faces, polygon_of, vertex_of = _read_object(obj, depsgraph, origins.get(obj.data))
+            bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+            if bad.size:
+                place = f'vertex {bad[0]} of "{obj.name}"'
+                raise UserError(f'"{name}": {place} has a coordinate that is not finite ({bad.size} such vertices)')
+            vertices.append(points)
+            triangles.append(faces + n_vertices)
+            owners.append(np.where(polygon_of < 0, -1, polygon_of + polygons.start))
+            own.append(np.where(vertex_of < 0, -1, vertex_of + its.start))
+            n_vertices += len(points)
+        axes = _axes(character, depsgraph)
+    faces, polygon_of = np.concatenate(triangles), np.concatenate(owners)
+    proper = ~repeats_a_vertex(faces)
+    if not (proper.any() and (polygon_of >= 0).any()):
+        names = ", ".join(f'"{obj.name}"' for obj in character.objects)
+        nodes = any(modifier.type == "NODES" for obj in character.objects for modifier in obj.modifiers)
+        hint = "; does it consist of instances? Then add a Realize Instances node" if nodes else ""
+        raise UserError(f"{names} has no faces: there is no surface to find parts on{hint}")
+    try:
+        mesh = TriangleMesh(np.concatenate(vertices), faces[proper])
+    except ValueError as error:
+        raise UserError(f'"{name}": {error}') from error
+    return Pose(name, character, mesh, polygon_of[proper], np.concatenate(own), axes)
+
+
+def _axes(character: Character, depsgraph: bpy.types.Depsgraph) -> FloatArray:
+    """(3, 3) the axes of the character's armature, or of its largest object, as columns.
+
+    Those by which bones and vertices are named .L and .R, whichever way the character stands in the scene.
+    """
+    armatures = [armature for armature in map(armature_of, character.objects) if armature is not None]
+    body = armatures[0] if armatures else max(character.objects, key=lambda obj: len(obj.data.polygons))
+    # A quaternion knows no mirroring: of a mirrored object, what is seen on the left is left.
+    return np.array(body.evaluated_get(depsgraph).matrix_world.to_quaternion().to_matrix(), dtype=np.float64)
+
+
+def _read_object(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, origin_name: str | None
+) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
+    """Vertices in world space, triangles, and what each is of the object's own mesh (-1: nothing, or not known).
+
+    Gives for each triangle the polygon that it comes from, and for each vertex the vertex.
+    """
+    evaluated = obj.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        mesh.calc_loop_triangles()
+        vertices = _get(mesh.vertices, "co", 3, np.float32).reshape(-1, 3)
+        triangles = _get(mesh.loop_triangles, "vertices", 3, np.int32).reshape(-1, 3)
+        polygon_of = _get(mesh.loop_triangles, "polygon_index", 1, np.int32)
+        same = _has_corners_of(mesh, obj.data)
+        if origin_name is not None and len(mesh.polygons):
+            origin = mesh.attributes.get(origin_name)
+            if origin is None:
+                raise UserError(
+                    f'"{obj.name}": a modifier makes faces and hides of what (as Remesh): apply it, or turn it off'
+                )
+            polygons = _get(origin.data, "value", 1, np.int32) - 1
+            same &= np.array_equal(polygons, np.arange(len(obj.data.polygons)))
+            polygon_of = polygons[polygon_of]
+        world = np.array(evaluated.matrix_world, dtype=np.float64)
+    finally:
+        evaluated.to_mesh_clear()
+    with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is refused by name
+        vertices = vertices @ world[:3, :3].T + world[:3, 3]
+    vertex_of = np.arange(len(vertices)) if same else np.full(len(vertices), -1)
+    return vertices, triangles.astype(np.int64), polygon_of.astype(np.int64), vertex_of
+
+
+def _has_corners_of(mesh: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:
+    """Whether the corners of two meshes' faces are at the same vertices: those of one are then those of the other."""
+    return len(mesh.vertices) == len(other.vertices) and np.array_equal(
+        _get(mesh.loops, "vertex_index", 1, np.int32), _get(other.loops, "vertex_index", 1, np.int32)
+    )
+
+
+def _get(collection: bpy.types.bpy_prop_collection, name: str, width: int, dtype: type) -> NDArray[Any]:
+    values: NDArray[Any] = np.empty(len(collection) * width, dtype=dtype)
+    collection.foreach_get(name, values)
+    return values
+
+
+@contextmanager
+def _marked_origins(character: Character) -> Iterator[dict[bpy.types.Mesh, str]]:
+    """While it lasts, meshes whose modifiers may make faces carry the number of each face, from 1, as an attribute.
+
+    From 1, since faces that a modifier takes from elsewhere get 0. Gives the name of the attribute for each mesh.
+    """
+    meshes = {obj.data for obj in character.objects if any(m.type not in DEFORMING for m in obj.modifiers)}
+    names: dict[bpy.types.Mesh, str] = {}
+    try:
+        for mesh in meshes:
+            origin = mesh.attributes.new(ORIGIN, "INT", "FACE")
+            names[mesh] = origin.name
+            origin.data.foreach_set("value", np.arange(1, len(mesh.polygons) + 1, dtype=np.int32))
+            mesh.update_tag()
+        yield names
+    finally:
+        for mesh, name in names.items():
+            mesh.attributes.remove(mesh.attributes[name])

@@ -1,0 +1,1 @@
+"""The sidebar: panels, menus, preview, messages and their translations."""

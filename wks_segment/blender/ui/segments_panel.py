@@ -1,0 +1,137 @@
+"""The list of segments in the sidebar."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from .main_panel import SubPanel, wrapped
+from .messages import in_panel
+from .translations import NAME
+
+PRESETS = {
+    "Human": (
+        "Head", "Hair", "Neck", "Torso", "Hips", "Arm", "Upper Arm", "Forearm", "Hand", "Leg", "Thigh", "Shin", "Foot",
+        "Clothes",
+    ),
+    "Quadruped": (
+        "Head", "Muzzle", "Ear", "Neck", "Torso", "Tail", "Tail Tip", "Leg", "Foreleg", "Hind Leg", "Paw", "Forepaw",
+        "Hind Paw", "Mane",
+    ),
+}  # fmt: skip
+"""Names to choose from. Sides have theirs from the part: .L and .R."""
+EMPTY = "No segments yet: learn a model, or apply one"
+
+
+class WKS_SEGMENT_UL_segments(bpy.types.UIList):
+    """A row: color, name, share, visibility."""
+
+    def draw_item(
+        self, context: bpy.types.Context, layout: Any, data: Any, item: Any, icon: int, active_data: Any,
+        active_property: str, index: int = 0, flt_flag: int = 0,
+    ) -> None:  # fmt: skip
+        row = layout.row(align=True)
+        color = row.row(align=True)
+        color.ui_units_x = 1.2
+        # Colors are written to corners of faces, which is not possible in Edit Mode.
+        color.enabled = context.mode != "EDIT_MESH"
+        color.prop(item, "color", text="")
+        row.separator(factor=0.5)
+        row.prop(item, "name", text="", emboss=False)
+        share = row.row(align=True)
+        share.alignment = "RIGHT"
+        share.label(text=f"{item.share:.1f} %")
+        row.operator(
+            "wks_segment.hide_segment", text="", icon="HIDE_ON" if item.hidden else "HIDE_OFF", emboss=False
+        ).part = item.number
+
+
+class WKS_SEGMENT_MT_merge(bpy.types.Menu):
+    """The segments that the active one can be merged with."""
+
+    bl_idname = "WKS_SEGMENT_MT_merge"
+    bl_label = "Merge Into"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        settings = context.scene.wks_segment
+        for index, item in enumerate(settings.segments):
+            if index != settings.active_segment:
+                self.layout.operator("wks_segment.merge_segments", text=item.name, translate=False).into = item.number
+
+
+class WKS_SEGMENT_MT_names(bpy.types.Menu):
+    """Names for the active segment."""
+
+    bl_idname = "WKS_SEGMENT_MT_names"
+    bl_label = "Name from Preset"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        row = self.layout.row()
+        for preset, names in PRESETS.items():
+            column = row.column()
+            column.label(text=preset, text_ctxt=NAME)
+            for name in names:
+                # As with Blender's own objects, the name itself is translated only if the user wants that of new data.
+                given = bpy.app.translations.pgettext_data(name, NAME)
+                column.operator("wks_segment.name_segment", text=name, text_ctxt=NAME).name = given
+
+
+class WKS_SEGMENT_MT_specials(bpy.types.Menu):
+    """What is needed less often."""
+
+    bl_idname = "WKS_SEGMENT_MT_specials"
+    bl_label = "Segment Specials"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.operator("wks_segment.show_segments", icon="HIDE_OFF")
+        self.layout.separator()
+        self.layout.operator("wks_segment.forget_faces", icon="X")
+        self.layout.operator("wks_segment.restore_segments", icon="LOOP_BACK")
+        self.layout.operator("wks_segment.refresh_segments", icon="FILE_REFRESH")
+
+
+class WKS_SEGMENT_PT_segments(SubPanel, bpy.types.Panel):
+    """The list, and what can be done with its active segment."""
+
+    bl_label = "Segments"
+    bl_options = set()
+
+    def draw(self, context: bpy.types.Context) -> None:
+        settings, layout = context.scene.wks_segment, self.layout
+        if not settings.segments:
+            row = layout.row()
+            column = row.column()
+            for line in wrapped(EMPTY):
+                column.label(text=line)
+            row.operator("wks_segment.refresh_segments", text="", icon="FILE_REFRESH", emboss=False)
+            return
+        row = layout.row()
+        row.template_list(
+            WKS_SEGMENT_UL_segments.__name__, "", settings, "segments", settings, "active_segment", rows=5
+        )
+        column = row.column(align=True)
+        column.operator("wks_segment.select_segment", text="", icon="RESTRICT_SELECT_OFF")
+        column.operator("wks_segment.isolate_segment", text="", icon="ZOOM_SELECTED")
+        column.menu("WKS_SEGMENT_MT_names", text="", icon="SORTALPHA")
+        column.separator()
+        column.menu("WKS_SEGMENT_MT_specials", text="", icon="DOWNARROW_HLT")
+        row = layout.row(align=True)
+        if context.mode == "EDIT_MESH":
+            row.operator("wks_segment.assign_faces", text=in_panel("Assign"))
+            row.operator("wks_segment.new_segment", text=in_panel("New"))
+            row.operator("wks_segment.forget_faces", text=in_panel("Forget"))
+        else:
+            row.menu("WKS_SEGMENT_MT_merge", text=in_panel("Merge Into"))
+            row.operator("wks_segment.split_segment", text=in_panel("Split"))
+        if settings.faces_by_hand:
+            layout.label(text=in_panel(f"{settings.faces_by_hand} faces by hand"), icon="HAND")
+
+
+CLASSES = (
+    WKS_SEGMENT_UL_segments,
+    WKS_SEGMENT_MT_merge,
+    WKS_SEGMENT_MT_names,
+    WKS_SEGMENT_MT_specials,
+    WKS_SEGMENT_PT_segments,
+)

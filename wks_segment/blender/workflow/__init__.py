@@ -1,0 +1,1 @@
+"""What operators and the command line run: the pipeline, background jobs, the live session, models."""

@@ -1,0 +1,1 @@
+"""Described poses: a mesh with its signature, computed once and cached."""

@@ -1,0 +1,1 @@
+"""From a surface to its signature: Laplacian, eigensolvers, Wave Kernel Signature."""
