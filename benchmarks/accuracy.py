@@ -17,13 +17,13 @@ from sklearn.metrics import adjusted_rand_score
 from threadpoolctl import threadpool_limits
 
 from benchmarks.solvers import N_PAIRS
-from benchmarks.speed import labeller, table_row
+from benchmarks.speed import labeler, table_row
 from wks_segment.core import TriangleMesh, eigenpairs, prepare_surface, wave_kernel_signature
 from wks_segment.core.poses.describe import VERTICES_PER_PAIR
 from wks_segment.core.spectral.signature import wave_kernel_signature_of
 
 LIMIT = 0.7
-"""Error of the signature, in per cent, that counts as too large."""
+"""Error of the signature, in percent, that counts as too large."""
 
 
 def main() -> None:
@@ -59,7 +59,7 @@ def mesh_files(paths: Sequence[Path]) -> list[Path]:
 
 @threadpool_limits.wrap(limits=1)
 def compare(mesh: TriangleMesh) -> tuple[int, float, float, float, float]:
-    """Vertices, error in per cent, adjusted Rand index, and CPU seconds of both."""
+    """Vertices, error in percent, adjusted Rand index, and CPU seconds of both."""
     mesh = prepare_surface(mesh, VERTICES_PER_PAIR * N_PAIRS).mesh
     n_pairs = N_PAIRS + int(mesh.components.max())
     start = time.process_time()
@@ -67,7 +67,7 @@ def compare(mesh: TriangleMesh) -> tuple[int, float, float, float, float]:
     between = time.process_time()
     signature = wave_kernel_signature_of(mesh, n_pairs)
     end = time.process_time()
-    labels_of = labeller(truth, mesh.vertex_areas)
+    labels_of = labeler(truth, mesh.vertex_areas)
     return (
         mesh.n_vertices,
         float(100 * np.linalg.norm(signature - truth) / np.linalg.norm(truth)),

@@ -86,7 +86,7 @@ def with_people(
 
 
 def of_pairs(labels: Sequence[IntArray]) -> list[float]:
-    """Adjusted Rand index of each two of some labellings."""
+    """Adjusted Rand index of each two of some labelings."""
     return [float(adjusted_rand_score(a, b)) for a, b in combinations(labels, 2)]
 
 

@@ -1,6 +1,6 @@
 """Real characters through the whole extension: `python -m benchmarks.characters FOLDER [--output FOLDER]`.
 
-Each file is imported by Blender; 5 poses are learned from, 3 others are only labelled. Prints a Markdown table and
+Each file is imported by Blender; 5 poses are learned from, 3 others are only labeled. Prints a Markdown table and
 writes a contact sheet. Rigged files without an animation are posed by turning their bones at random.
 """
 

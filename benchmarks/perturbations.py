@@ -44,9 +44,9 @@ def shot_noise(mesh: TriangleMesh, strength: float, generator: np.random.Generat
 def holes(mesh: TriangleMesh, strength: float, generator: np.random.Generator, radius: float = HOLE) -> Perturbed:
     """A number of round holes, at places drawn by area."""
     kept = np.ones(mesh.n_faces, dtype=bool)
-    centres = mesh.vertices[mesh.faces].mean(axis=1)
+    centers = mesh.vertices[mesh.faces].mean(axis=1)
     for face in generator.choice(mesh.n_faces, round(strength), p=mesh.face_areas / mesh.area):
-        kept &= np.linalg.norm(centres - centres[face], axis=1) > radius * _diagonal(mesh)
+        kept &= np.linalg.norm(centers - centers[face], axis=1) > radius * _diagonal(mesh)
     return _of_faces(mesh, mesh.faces[kept]), np.flatnonzero(kept)
 
 
@@ -84,8 +84,8 @@ def sampling(mesh: TriangleMesh, strength: float, generator: np.random.Generator
     bpy.data.objects.remove(obj)
     bpy.data.meshes.remove(data)
     coarse = TriangleMesh(vertices.reshape(-1, 3), faces.reshape(-1, 3))
-    centres = cKDTree(mesh.vertices[mesh.faces].mean(axis=1))
-    return coarse, centres.query(coarse.vertices[coarse.faces].mean(axis=1))[1]
+    centers = cKDTree(mesh.vertices[mesh.faces].mean(axis=1))
+    return coarse, centers.query(coarse.vertices[coarse.faces].mean(axis=1))[1]
 
 
 def finer(mesh: TriangleMesh, strength: float, generator: np.random.Generator) -> Perturbed:

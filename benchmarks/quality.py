@@ -305,7 +305,7 @@ def _pairs_row(what: str, preset: str, labels: Sequence[IntArray]) -> str:
 
 
 def _picture(shapes: Sequence[tuple[str, PoseSignature, IntArray]], path: Path) -> None:
-    """Shapes in the colours of their faces' labels, from y upwards turned to Blender's z upwards."""
+    """Shapes in the colors of their faces' labels, from y upwards turned to Blender's z upwards."""
     from wks_segment.blender.render.contact_sheet import Tile, render_poses
     from wks_segment.blender.scene.poses import Pose
 

@@ -133,7 +133,7 @@ def compare(kind: str, mesh: TriangleMesh) -> Iterator[tuple[list[str], str, flo
                 if turn == 0 or method != "exact" or mesh.n_vertices <= EVERY_KIND_UP_TO:
                     runs[method].append(run(method, source, Path(folder) / "result.npz"))
     truth = runs["exact"][0]
-    labels_of = labeller(truth["signature"], mesh.vertex_areas)
+    labels_of = labeler(truth["signature"], mesh.vertex_areas)
     expected = labels_of(truth["signature"])
     for method in methods:
         best = min(runs[method], key=lambda r: r["cpu"])
@@ -150,13 +150,13 @@ def compare(kind: str, mesh: TriangleMesh) -> Iterator[tuple[list[str], str, flo
         yield row, method, float(best["cpu"])
 
 
-def labeller(signature: FloatArray, areas: FloatArray) -> Callable[[FloatArray], Any]:
+def labeler(signature: FloatArray, areas: FloatArray) -> Callable[[FloatArray], Any]:
     """A function from signatures to labels, by one mixture that is fitted on the true signature."""
     step = max(1, len(signature) // 100_000)
     logs = np.log(signature[::step].astype(np.float64) + SIGNATURE_OFFSET)
-    centre, spread = logs.mean(axis=0), logs.std(axis=0)
-    mixture = fit_mixture((logs - centre) / spread, areas[::step], SEGMENTS)
-    return lambda other: mixture.posteriors((np.log(other + SIGNATURE_OFFSET) - centre) / spread).argmax(axis=1)
+    center, spread = logs.mean(axis=0), logs.std(axis=0)
+    mixture = fit_mixture((logs - center) / spread, areas[::step], SEGMENTS)
+    return lambda other: mixture.posteriors((np.log(other + SIGNATURE_OFFSET) - center) / spread).argmax(axis=1)
 
 
 def run(method: str, source: Path, target: Path) -> dict[str, Any]:

@@ -131,7 +131,7 @@ def run(n_poses: int) -> None:
     print(f"\nLearned in {took:.1f} seconds: {', '.join(session.work.report.facts[:2])}.\n")
     clock = Clock()
     clock.wrapped(PosedMesh, "mean", "posteriors")
-    clock.wrapped(PosedMesh, "labelled", "clean-up")
+    clock.wrapped(PosedMesh, "labeled", "clean-up")
     clock.wrapped(PoseSegmentation, "polygon_sides", "sides")
     print(table_row(["change", *COLUMNS]))
     print(table_row(["---"] * (1 + len(COLUMNS))))

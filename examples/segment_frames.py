@@ -1,6 +1,6 @@
 """Learn a character's parts from frames of its animation, in plain Python.
 
-    blender --background --python-exit-code 1 --python examples/segment_frames.py -- walk.glb labelled.blend
+    blender --background --python-exit-code 1 --python examples/segment_frames.py -- walk.glb labeled.blend
 
 SciPy and scikit-learn come with the extension, or with `pip install -e .` where `bpy` is a Python module. What the
 operators do in one call is written out here, so that you can change any step: other poses, another model, another use

@@ -140,7 +140,7 @@ def draw(sheet: Sheet, path: Path, models: dict[Any, str]) -> None:
         bpy.context.view_layer.objects.active = obj
     (pose,) = poses.read_objects(bpy.context, [character])
     tiles = [
-        Tile(pose, labelled(character, changes, (sheet.character, models)), text)
+        Tile(pose, labeled(character, changes, (sheet.character, models)), text)
         for text, changes in sheet.tiles.items()
     ]
     render_poses(tiles, path)
@@ -150,7 +150,7 @@ def draw(sheet: Sheet, path: Path, models: dict[Any, str]) -> None:
     few.save(path, optimize=True)
 
 
-def labelled(character: Character, changes: dict[str, Any], known: tuple[Any, dict[Any, str]]) -> IntArray:
+def labeled(character: Character, changes: dict[str, Any], known: tuple[Any, dict[Any, str]]) -> IntArray:
     """(p,) part of each polygon by the default settings with these changes."""
     settings, (kind, models) = bpy.context.scene.wks_segment, known
     for name in {name for sheet in SHEETS.values() for of in sheet.tiles.values() for name in of}:

@@ -1,4 +1,4 @@
-"""WKS Segment: the same parts, labels and colours in every pose of a character.
+"""WKS Segment: the same parts, labels and colors in every pose of a character.
 
 `wks_segment.core` is the method (NumPy, SciPy, scikit-learn), `wks_segment.blender` the Blender extension.
 Importing this package imports neither.

@@ -28,7 +28,7 @@ def icosphere(subdivisions):
 
 
 def grid(nx, ny, width=1.0, height=1.0):
-    """Flat rectangle of nx × ny cells, with alternating diagonals so that no direction is favoured."""
+    """Flat rectangle of nx × ny cells, with alternating diagonals so that no direction is favored."""
     x, y = np.meshgrid(np.linspace(0, width, nx + 1), np.linspace(0, height, ny + 1), indexing="ij")
     vertices = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
     faces = []

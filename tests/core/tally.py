@@ -6,7 +6,7 @@ OUTCOMES = defaultdict(Counter)
 
 
 def count(what, names, outcome):
-    """One example of a kind ("mesh"), the names of what was in it, and how it ended ("labelled")."""
+    """One example of a kind ("mesh"), the names of what was in it, and how it ended ("labeled")."""
     for name in ("all", *dict.fromkeys(names)):
         OUTCOMES[what, name][outcome] += 1
 

@@ -31,7 +31,7 @@ def messages():
                 continue
             name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
             if name == "explain" or (name == "tell" and "INFO" not in ast.dump(call.args[1])):
-                parts = literals(call.args[-1])  # what an operator tells, and why a button is grey
+                parts = literals(call.args[-1])  # what an operator tells, and why a button is gray
             else:
                 parts = literals(call.args[0]) if name in REFUSALS else []
             # What only puts a name before the message of another error says nothing of its own.

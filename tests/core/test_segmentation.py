@@ -119,7 +119,7 @@ def test_seams_do_not_matter_and_each_copy_of_a_vertex_gets_the_label(model):
     np.testing.assert_array_equal(model.predict(soup), model.predict(POSES[0])[POSES[0].faces.ravel()])
 
 
-def test_a_coarse_mesh_is_refined_inside_and_labelled_as_it_is():
+def test_a_coarse_mesh_is_refined_inside_and_labeled_as_it_is():
     coarse = [creature(bend, 2) for bend in (0.0, 0.6)]
     fitted = PoseSegmentation(3, n_eigenpairs=100).fit(coarse)
     assert fitted.describe(coarse[0]).surface.mesh.n_vertices >= 1000
@@ -140,7 +140,7 @@ def test_loose_parts_all_get_labels_and_do_not_break_the_body():
     assert set(fitted.segment_faces(with_eyes(0.3))) <= set(range(4))
 
 
-def test_polygons_of_several_triangles_are_labelled_as_wholes_over_all_poses(model):
+def test_polygons_of_several_triangles_are_labeled_as_wholes_over_all_poses(model):
     # Each triangle of the coarse mesh is a polygon of four of the fine one.
     coarse = [creature(bend, 3) for bend in (0.0, 0.6)]
     fine = [prepare_surface(mesh, 2000) for mesh in coarse]
@@ -184,7 +184,7 @@ def test_an_error_from_progress_ends_learning_in_the_middle_of_a_stage(stage):
     assert not hasattr(learner, "regions_") or learner.regions_ is None
 
 
-def test_an_error_from_progress_ends_labelling(model):
+def test_an_error_from_progress_ends_labeling(model):
     described = [model.describe(mesh) for mesh in POSES]
     shares = []
 

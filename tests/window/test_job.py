@@ -1,4 +1,4 @@
-"""Work that does not block the window: progress, orbiting, cancelling, and what ends a job by itself."""
+"""Work that does not block the window: progress, orbiting, canceling, and what ends a job by itself."""
 
 import pytest
 
@@ -30,7 +30,7 @@ def test_progress_is_shown_and_the_view_stays_orbitable(learning, shot):
 
 
 @pytest.mark.parametrize("how", ["escape", "button"])
-def test_cancelling_writes_nothing_and_one_can_learn_again(learning, shot, how):
+def test_canceling_writes_nothing_and_one_can_learn_again(learning, shot, how):
     before = learning.ask("contents", BODY)
     if how == "escape":
         learning.over_viewport()
@@ -38,7 +38,7 @@ def test_cancelling_writes_nothing_and_one_can_learn_again(learning, shot, how):
     else:
         learning.press("wks_segment.cancel")
     learning.wait_for("job_is_over", patience=30)
-    shot(f"cancelled by {how}")
+    shot(f"canceled by {how}")
     assert learning.ask("contents", BODY) == before
     assert not learning.ask("state")["model"]
     learning.enter("pose_count", "2")

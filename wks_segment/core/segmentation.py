@@ -15,7 +15,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from . import model_file
-from .labeling.labeler import Labeller
+from .labeling.labeler import Labeler
 from .labeling.region_atlas import RegionAtlas
 from .learning.candidates import SMOOTHING_LENGTH
 from .learning.gaussian_mixture import CovarianceType, GaussianMixture, drawn_evenly, fit_mixtures
@@ -95,7 +95,7 @@ class PoseSegmentation(PoseDescriber):
     Attributes
     ----------
     mixture_ : GaussianMixture
-        In the space of centred and scaled signatures, with K components.
+        In the space of centered and scaled signatures, with K components.
     grouping_ : Grouping or None
         In which order components make segments; None with the paper's setting.
     regions_ : RegionAtlas or None
@@ -110,7 +110,7 @@ class PoseSegmentation(PoseDescriber):
         About what `comparable_score` would give for each learned pose, had it not been learned; of one pose alone, what
         it gives.
     part_notes_ : PartNotes
-        Names and colours that a user gave the parts, and which are one: kept with the model, and no more.
+        Names and colors that a user gave the parts, and which are one: kept with the model, and no more.
     """
 
     def __init__(
@@ -198,7 +198,7 @@ class PoseSegmentation(PoseDescriber):
             shares, group = np.full(MAX_SAMPLES, 1 / MAX_SAMPLES), group[drawn]
         signature = np.concatenate(signatures)
         samples = self._scaled(signature).astype(np.float64)
-        samples = self._centred(samples, shares)
+        samples = self._centered(samples, shares)
 
         def mixing(share: float) -> None:
             tick("mixture", DESCRIBED + (MIXED - DESCRIBED) * share)
@@ -219,7 +219,7 @@ class PoseSegmentation(PoseDescriber):
         else:
             types = AUTO[: len(poses)] if covariance_type == "auto" else (covariance_type,)
             plan = Plan(poses, samples, shares, wanted, types, self.n_segments == "auto")
-            layout = plan.laid_out(self._standardised, [self._setting("scaling")], cache, mixing, grouping)
+            layout = plan.laid_out(self._standardized, [self._setting("scaling")], cache, mixing, grouping)
             self.mixture_, self.grouping_ = Candidates(layout, self._number).best()
             self._learn_regions(works, rest, naming)
         self.usual_scores_ = self._usual_scores(samples, signature, shares, group)
@@ -232,14 +232,14 @@ class PoseSegmentation(PoseDescriber):
 
     def predict_proba(self, mesh: AnyPose) -> FloatArray:
         """(n, n_segments) posterior of each segment at each vertex; rows sum to 1."""
-        labeller, work = self._labeller(), self._work(mesh)
-        return work.surface.to_vertices(labeller.joined(labeller.posteriors(work)))
+        labeler, work = self._labeler(), self._work(mesh)
+        return work.surface.to_vertices(labeler.joined(labeler.posteriors(work)))
 
     @threadpool_limits.wrap(limits=1, user_api="blas")  # on arrays this small, threads wait for each other
     def predict_soft(self, mesh: AnyPose) -> FloatArray:
         """(n, n_segments) posteriors as `predict_proba` has them, smoothed as far as the labels of faces are."""
-        labeller, work = self._labeller(), self._work(mesh)
-        posteriors = labeller.smoothed(work, labeller.n_segments)
+        labeler, work = self._labeler(), self._work(mesh)
+        posteriors = labeler.smoothed(work, labeler.n_segments)
         if self._setting("smoothness") > 0:
             # Obtuse triangles let the heat flow a little beyond 0 and 1.
             posteriors = np.clip(posteriors, 0, 1).astype(np.float64)
@@ -253,7 +253,7 @@ class PoseSegmentation(PoseDescriber):
         """
         mixture = self._fitted()
         pose = self._work(mesh).pose
-        likelihoods = mixture.log_likelihoods(self._standardised(pose.signature))
+        likelihoods = mixture.log_likelihoods(self._standardized(pose.signature))
         masses = unit_area_masses(pose.surface.mesh)
         return float(masses @ likelihoods / masses.sum() - self._log_unit())
 
@@ -264,7 +264,7 @@ class PoseSegmentation(PoseDescriber):
         signature whatever enters the mixture.
         """
         pose = self._work(mesh).pose
-        likelihoods = self._fitted().log_likelihoods(self._standardised(pose.signature))
+        likelihoods = self._fitted().log_likelihoods(self._standardized(pose.signature))
         masses = unit_area_masses(pose.surface.mesh)
         return self._comparable(likelihoods, pose.signature, masses / masses.sum())
 
@@ -275,7 +275,7 @@ class PoseSegmentation(PoseDescriber):
         one of its segment either.
         A loose piece that is smaller as a whole takes the label of what is next to it.
         """
-        return self._labeller().clean([self._work(mesh)], None, self._least_share(min_share))[0]
+        return self._labeler().clean([self._work(mesh)], None, self._least_share(min_share))[0]
 
     def segment_regions(self, mesh: AnyPose, min_share: float | None = None) -> IntArray:
         """(m,) connected part of each face: left and right hand are two.
@@ -286,10 +286,10 @@ class PoseSegmentation(PoseDescriber):
         connected parts of the components, in the order of these. Parts under `min_share` of the area belong to the
         part next to them.
         """
-        labeller, work, least_share = self._labeller(), self._work(mesh), self._least_share(min_share)
+        labeler, work, least_share = self._labeler(), self._work(mesh), self._least_share(min_share)
         if self.regions_ is None:
-            return connected_regions(*labeller.clean([work], None, least_share))
-        return labeller.named_regions(self.regions_, work, least_share)
+            return connected_regions(*labeler.clean([work], None, least_share))
+        return labeler.named_regions(self.regions_, work, least_share)
 
     def segment_polygons(
         self,
@@ -311,7 +311,7 @@ class PoseSegmentation(PoseDescriber):
         progress
             Called after each pose with the share that is done, 0 to 1. An error that it raises ends the work.
         marked : (q, 2) int array, optional
-            Neighbouring polygons between which a border is welcome, as at hard edges, seams and borders of materials:
+            Neighboring polygons between which a border is welcome, as at hard edges, seams and borders of materials:
             one nearby moves there.
 
         Returns
@@ -325,7 +325,7 @@ class PoseSegmentation(PoseDescriber):
             If there is no pose, or the lengths do not fit.
         """
         works = self._posed(poses, polygons)
-        return self._labeller().clean(works, polygons, self._least_share(min_share), progress, marked)[0]
+        return self._labeler().clean(works, polygons, self._least_share(min_share), progress, marked)[0]
 
     def polygon_sides(
         self,
@@ -356,7 +356,7 @@ class PoseSegmentation(PoseDescriber):
         works = self._posed(poses, polygons)
         if self.sides_ is None:
             return np.zeros(len(labels), dtype=np.int64)
-        return self._labeller().sides(self.sides_, works, polygons, labels, progress)
+        return self._labeler().sides(self.sides_, works, polygons, labels, progress)
 
     def with_segments(
         self,
@@ -503,7 +503,7 @@ class PoseSegmentation(PoseDescriber):
     def _least_share(self, min_share: float | None) -> float:
         """Smallest part, as a share of the area; ValueError if it is none."""
         if min_share is None:
-            return self._labeller().least_share
+            return self._labeler().least_share
         if not 0 <= min_share < 1:
             raise ValueError(f"min_share must be from 0 to below 1, not {min_share!r}")
         return min_share
@@ -539,24 +539,24 @@ class PoseSegmentation(PoseDescriber):
         return np.log(signature + SIGNATURE_OFFSET) if self._setting("scaling") == "log" else signature
 
     @threadpool_limits.wrap(limits=1, user_api="blas")  # the same digits with any number of threads
-    def _centred(self, samples: FloatArray, shares: FloatArray) -> FloatArray:
-        """Learn the centre and the spread of samples; the samples without them."""
+    def _centered(self, samples: FloatArray, shares: FloatArray) -> FloatArray:
+        """Learn the center and the spread of samples; the samples without them."""
         self.centre_ = shares @ samples
         self.spread_ = np.maximum(np.sqrt(shares @ (samples - self.centre_) ** 2), model_file.LEAST)
         if self.preset == "paper":
             self.spread_ = np.ones_like(self.spread_)
         return np.asarray((samples - self.centre_) / self.spread_)
 
-    def _standardised(self, signature: FloatArray) -> FloatArray:
+    def _standardized(self, signature: FloatArray) -> FloatArray:
         scaled = self._scaled(signature)  # a new array, or the signature itself; in its own precision
         return np.asarray((scaled - self.centre_.astype(scaled.dtype)) / self.spread_.astype(scaled.dtype))
 
     def _log_unit(self) -> float:
-        """To be taken from a log-density in standardised units: those of the signature are what models share."""
+        """To be taken from a log-density in standardized units: those of the signature are what models share."""
         return float(np.log(self.spread_).sum())
 
     def _comparable(self, log_likelihoods: FloatArray, signature: FloatArray, shares: FloatArray) -> float:
-        """See `comparable_score`; of log-densities in standardised units at vertices with shares of the area."""
+        """See `comparable_score`; of log-densities in standardized units at vertices with shares of the area."""
         densities = log_likelihoods - self._log_unit()
         if self._setting("scaling") == "raw":
             densities = densities + np.log(signature + SIGNATURE_OFFSET).sum(axis=1)
@@ -566,7 +566,7 @@ class PoseSegmentation(PoseDescriber):
     def _usual_scores(
         self, samples: FloatArray, signature: FloatArray, shares: FloatArray, group: IntArray
     ) -> FloatArray:
-        """See `usual_scores_`; of standardised samples of the signature, given which pose each is of."""
+        """See `usual_scores_`; of standardized samples of the signature, given which pose each is of."""
         poses = np.unique(group)
         if len(poses) > 1:
             likelihoods = left_out_likelihoods(self.mixture_, samples, shares, group)
@@ -593,10 +593,10 @@ class PoseSegmentation(PoseDescriber):
         """Smoothing length, in units of the square root of the area."""
         return float(self._setting("smoothness") * SMOOTHING_LENGTH)
 
-    def _labeller(self) -> Labeller:
+    def _labeler(self) -> Labeler:
         """The fitted mixture with the settings as they are."""
         mixture = self._fitted()
-        return Labeller(mixture, self.grouping_, self._standardised, self.n_segments_, self._length())
+        return Labeler(mixture, self.grouping_, self._standardized, self.n_segments_, self._length())
 
     def _learn_regions(
         self, works: Sequence[Workpiece], rest: TriangleMesh | None, tick: Callable[[float], None]
@@ -614,5 +614,5 @@ class PoseSegmentation(PoseDescriber):
             def of_atlas(share: float, begun: int = i) -> None:
                 tick((begun + share) / len(new))
 
-            atlases[n_groups] = self._labeller().atlas(n_groups, works, rest, of_atlas)
+            atlases[n_groups] = self._labeler().atlas(n_groups, works, rest, of_atlas)
         self.regions_, self.sides_ = (atlases[n_groups] for n_groups in numbers)

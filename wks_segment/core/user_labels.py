@@ -1,4 +1,4 @@
-"""What a user has said of a model's parts: their names, their colours, and which are one. The core only keeps it."""
+"""What a user has said of a model's parts: their names, their colors, and which are one. The core only keeps it."""
 
 from __future__ import annotations
 

@@ -235,9 +235,9 @@ def test_input_file_may_be_the_output(command, folder, tmp_path):
     assert len(np.unique(labels_of(bpy.data.objects["Own"]))) == 4
 
 
-def palette_distance(colours):
-    """(n,) largest difference of each sRGB colour to the nearest of the first four of the palette."""
-    return np.abs(colours[:, None] - palette()[None, :4]).max(axis=2).min(axis=1)
+def palette_distance(colors):
+    """(n,) largest difference of each sRGB color to the nearest of the first four of the palette."""
+    return np.abs(colors[:, None] - palette()[None, :4]).max(axis=2).min(axis=1)
 
 
 def srgb(linear):
@@ -245,7 +245,7 @@ def srgb(linear):
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".obj"])
-def test_colours_are_in_the_output(command, folder, tmp_path, suffix):
+def test_colors_are_in_the_output(command, folder, tmp_path, suffix):
     output = tmp_path / f"out{suffix}"
     assert command("segment", folder / "pose_0.obj", *QUICK, "--output", output).code == 0
     empty()
@@ -255,11 +255,11 @@ def test_colours_are_in_the_output(command, folder, tmp_path, suffix):
         bpy.ops.wm.obj_import(filepath=str(output))
     mesh = mesh_of_scene().data
     assert len(mesh.color_attributes) == 1
-    colours = srgb(numbers(mesh, mesh.color_attributes[0].name, "color", 4)[:, :3])
-    near = palette_distance(colours) < 0.02
-    # An .obj file has colours at vertices only, which blend along borders.
+    colors = srgb(numbers(mesh, mesh.color_attributes[0].name, "color", 4)[:, :3])
+    near = palette_distance(colors) < 0.02
+    # An .obj file has colors at vertices only, which blend along borders.
     assert near.mean() > (0.99 if suffix == ".glb" else 0.6)
-    used = np.abs(colours[near][:, None] - palette()[None, :4]).max(axis=2).argmin(axis=1)
+    used = np.abs(colors[near][:, None] - palette()[None, :4]).max(axis=2).argmin(axis=1)
     assert len(np.unique(used)) == 4
 
 

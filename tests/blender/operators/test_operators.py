@@ -39,7 +39,7 @@ UNSEEN = 0.6
 
 @pytest.fixture
 def learned(settings):
-    """Three objects in three poses, learned from and labelled."""
+    """Three objects in three poses, learned from and labeled."""
     poses = limbed_poses(*BENDS)
     select(*poses)
     assert OPS.learn() == {"FINISHED"}
@@ -99,7 +99,7 @@ def test_learn_from_shape_keys_labels_the_object_and_keeps_its_keys(settings):
     assert "3 poses" in settings.model_summary
 
 
-def test_objects_on_one_armature_are_labelled_as_one(settings):
+def test_objects_on_one_armature_are_labeled_as_one(settings):
     obj = limbed_rigged("Body")
     hat = mesh_object(
         [(0, 0, 1.5), (1, 0, 1.5), (0, 1, 1.5), (0, 0, 2)], [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)], "Hat"
@@ -235,7 +235,7 @@ def test_clear_touches_only_what_is_selected(learned):
     assert "wks_segment" in learned[1].data.attributes
 
 
-# Grey buttons
+# Gray buttons
 
 
 def refusal(operator):
@@ -246,7 +246,7 @@ def refusal(operator):
 
 
 @pytest.mark.parametrize("name", ["learn", "apply", "clear"])
-def test_buttons_are_grey_in_edit_mode(learned, name):
+def test_buttons_are_gray_in_edit_mode(learned, name):
     bpy.ops.object.mode_set(mode="EDIT")
     assert "Switch to Object Mode first" in refusal(getattr(OPS, name))
     bpy.ops.object.mode_set(mode="OBJECT")
@@ -254,7 +254,7 @@ def test_buttons_are_grey_in_edit_mode(learned, name):
 
 
 @pytest.mark.parametrize("name", ["learn", "apply"])
-def test_buttons_are_grey_without_a_selected_mesh(learned, name):
+def test_buttons_are_gray_without_a_selected_mesh(learned, name):
     select()
     assert "Select the mesh of a character first" in refusal(getattr(OPS, name))
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
@@ -310,23 +310,23 @@ def test_the_list_is_of_the_meshes_on_the_selected_armature(settings):
     for obj in (one, other):
         write_labels(obj.data, np.zeros(len(obj.data.polygons), dtype=np.int64))
     select(one.parent)
-    assert segment_list.labelled(settings) == [one]
+    assert segment_list.labeled(settings) == [one]
     select()
-    assert segment_list.labelled(settings) == [one, other]
+    assert segment_list.labeled(settings) == [one, other]
 
 
 @pytest.mark.parametrize("name", ["apply", "save_model"])
-def test_buttons_are_grey_without_a_model(name):
+def test_buttons_are_gray_without_a_model(name):
     select(limbed())
     assert "No model yet" in refusal(getattr(OPS, name))
 
 
-def test_clear_is_grey_where_there_are_no_segments():
+def test_clear_is_gray_where_there_are_no_segments():
     select(limbed())
     assert "Select an object that has segments" in refusal(OPS.clear)
 
 
-def test_clear_is_grey_where_only_the_artist_used_our_name():
+def test_clear_is_gray_where_only_the_artist_used_our_name():
     obj = limbed()
     obj.data["wks_segment"] = 1
     select(obj)
@@ -523,8 +523,8 @@ def test_model_file_that_does_not_exist(learned, tmp_path):
     fails(OPS.load_model, "missing.json was not loaded", filepath=str(tmp_path / "missing.json"))
 
 
-def test_model_of_more_segments_than_there_are_colours(settings, tmp_path):
-    """The core sets no limit. Whether such a model is refused or coloured, nothing may stay behind."""
+def test_model_of_more_segments_than_there_are_colors(settings, tmp_path):
+    """The core sets no limit. Whether such a model is refused or colored, nothing may stay behind."""
     obj, path = limbed(), tmp_path / "many.json"
     (pose,) = reader.read_objects(bpy.context, [Character((obj,))])
     PoseSegmentation(n_segments=90, n_eigenpairs=30, n_energies=40).fit([pose.mesh]).save(path)
@@ -652,7 +652,7 @@ def drawn(panel):
 
 
 @pytest.mark.parametrize("automatic", [False, True])
-def test_number_is_grey_where_it_is_automatic(settings, automatic):
+def test_number_is_gray_where_it_is_automatic(settings, automatic):
     settings.auto_segments = automatic
     column = drawn(main_panel.WKS_SEGMENT_PT_main).column.return_value
     column.prop.assert_any_call(settings, "auto_segments")

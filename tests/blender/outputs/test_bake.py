@@ -36,7 +36,7 @@ def unwrapped(obj):
 
 
 @pytest.fixture
-def labelled(settings):
+def labeled(settings):
     obj = unwrapped(limbed())
     write_labels(obj.data, stripes(obj.data))
     settings.bake_size, settings.bake_margin = SIZE, 4
@@ -106,32 +106,32 @@ def image_of(obj):
 
 
 @pytest.mark.parametrize("palette", ["calm", "maximal", "color_blind"])
-def test_every_pixel_has_the_color_of_the_face_that_covers_it(labelled, settings, palette):
+def test_every_pixel_has_the_color_of_the_face_that_covers_it(labeled, settings, palette):
     settings.palette = palette
     assert OPS.bake() == {"FINISHED"}
-    image = image_of(labelled)
+    image = image_of(labeled)
     assert (image.name, tuple(image.size)) == ("Limbed ID Map", (SIZE, SIZE))
     assert image.colorspace_settings.name == "Non-Color"
     assert image.packed_file is not None
-    wrong, inside = wrong_pixels(image, [labelled], Style(palette=palette))
+    wrong, inside = wrong_pixels(image, [labeled], Style(palette=palette))
     assert inside > 0.3 * SIZE**2
     assert wrong == 0
 
 
-def test_every_pixel_has_a_color_of_the_palette_or_is_black(labelled):
+def test_every_pixel_has_a_color_of_the_palette_or_is_black(labeled):
     OPS.bake()
-    seen = {tuple(color) for color in pixels(image_of(labelled)).reshape(-1, 3).tolist()}
+    seen = {tuple(color) for color in pixels(image_of(labeled)).reshape(-1, 3).tolist()}
     assert seen == {(0, 0, 0), *map(tuple, colors_of(np.arange(4), Style()).tolist())}
 
 
 @pytest.mark.parametrize("margin", [0, 3, 12])
-def test_margin_is_as_wide_as_asked_for(labelled, settings, margin):
+def test_margin_is_as_wide_as_asked_for(labeled, settings, margin):
     settings.bake_size, settings.bake_margin = 64, 0
     OPS.bake()
-    island = pixels(image_of(labelled)).any(axis=2)
+    island = pixels(image_of(labeled)).any(axis=2)
     settings.bake_margin = margin
     OPS.bake()
-    grown = pixels(image_of(labelled)).any(axis=2)
+    grown = pixels(image_of(labeled)).any(axis=2)
     rows, columns = np.nonzero(island)
     away = np.full(island.shape, np.inf)
     for row, column in np.argwhere(~island):
@@ -139,20 +139,20 @@ def test_margin_is_as_wide_as_asked_for(labelled, settings, margin):
     np.testing.assert_array_equal(grown, island | (away <= margin))
 
 
-def test_a_modifier_that_moves_uvs_is_baked_as_it_is_seen(labelled):
-    labelled.modifiers.new("Smooth", "SUBSURF").levels = 1
+def test_a_modifier_that_moves_uvs_is_baked_as_it_is_seen(labeled):
+    labeled.modifiers.new("Smooth", "SUBSURF").levels = 1
     OPS.bake()
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    mesh = labelled.evaluated_get(depsgraph).to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
-    seen = pixels(image_of(labelled))
+    mesh = labeled.evaluated_get(depsgraph).to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
+    seen = pixels(image_of(labeled))
     colors = colors_of(numbers(mesh, "wks_segment").astype(int), Style())
     for polygon, rows, columns, depth in covering(mesh, SIZE, "UVMap"):
         assert (seen[rows, columns] == colors[polygon])[depth > NEAR].all()
 
 
-def test_the_image_is_saved_with_the_file(labelled, tmp_path):
+def test_the_image_is_saved_with_the_file(labeled, tmp_path):
     OPS.bake()
-    before = pixels(image_of(labelled))
+    before = pixels(image_of(labeled))
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
     np.testing.assert_array_equal(pixels(image_of(bpy.data.objects["Limbed"])), before)
@@ -161,9 +161,9 @@ def test_the_image_is_saved_with_the_file(labelled, tmp_path):
 # What is not
 
 
-def test_nothing_else_changes(labelled):
+def test_nothing_else_changes(labeled):
     bpy.context.scene.render.engine = "BLENDER_WORKBENCH"
-    labelled.data.materials.append(bpy.data.materials.new("Skin"))
+    labeled.data.materials.append(bpy.data.materials.new("Skin"))
     before = scene_snapshot()
     assert OPS.bake() == {"FINISHED"}
     assert changes(before, scene_snapshot()) == [
@@ -174,35 +174,35 @@ def test_nothing_else_changes(labelled):
     assert list(bpy.data.images.keys()) == ["Limbed ID Map"]
 
 
-def test_clear_removes_the_image_unless_it_is_used(labelled):
-    clear_labels(labelled.data)
-    before, labels = scene_snapshot(), stripes(labelled.data)
+def test_clear_removes_the_image_unless_it_is_used(labeled):
+    clear_labels(labeled.data)
+    before, labels = scene_snapshot(), stripes(labeled.data)
     for used in (False, True):
-        write_labels(labelled.data, labels)
+        write_labels(labeled.data, labels)
         OPS.bake()
         if used:
             before["images"] = scene_snapshot()["images"]
             material = bpy.data.materials.new("Mask")
             if bpy.app.version < (5, 0, 0):
                 material.use_nodes = True
-            material.node_tree.nodes.new("ShaderNodeTexImage").image = image_of(labelled)
+            material.node_tree.nodes.new("ShaderNodeTexImage").image = image_of(labeled)
             before["materials"] = ["Mask"]
         OPS.clear()
         assert not changes(before, scene_snapshot())
 
 
-def test_new_labels_keep_the_image_until_it_is_baked_anew(labelled):
+def test_new_labels_keep_the_image_until_it_is_baked_anew(labeled):
     OPS.bake()
-    image, before = image_of(labelled), pixels(image_of(labelled))
-    write_labels(labelled.data, 3 - stripes(labelled.data))
-    assert image_of(labelled) is image
+    image, before = image_of(labeled), pixels(image_of(labeled))
+    write_labels(labeled.data, 3 - stripes(labeled.data))
+    assert image_of(labeled) is image
     np.testing.assert_array_equal(pixels(image), before)
     OPS.bake()
-    assert image_of(labelled) is image
-    assert wrong_pixels(image, [labelled], Style())[0] == 0
+    assert image_of(labeled) is image
+    assert wrong_pixels(image, [labeled], Style())[0] == 0
 
 
-def test_undo_gives_back_what_was(labelled):
+def test_undo_gives_back_what_was(labeled):
     before = scene_snapshot()
     bpy.ops.ed.undo_push(message="before")
     OPS.bake()
@@ -232,26 +232,26 @@ def test_without_a_uv_map_it_is_refused_or_unwrapped_if_asked_for(settings):
     assert not obj.data.uv_layers
 
 
-def test_a_uv_map_without_area_is_refused(labelled):
-    uvs = labelled.data.uv_layers.active.data
+def test_a_uv_map_without_area_is_refused(labeled):
+    uvs = labeled.data.uv_layers.active.data
     uvs.foreach_set("uv", np.zeros(2 * len(uvs), dtype=np.float32))
-    labelled.data.update()
+    labeled.data.update()
     with pytest.raises(RuntimeError, match="no UV map with faces in it"):
         OPS.bake()
 
 
-def test_faces_that_overlap_and_faces_outside_are_warned_of(labelled, settings, printed):
-    uvs = numbers(labelled.data, "UVMap", "vector", 2)
-    layer, middle = labelled.data.uv_layers.active, (uvs.min(axis=0) + uvs.max(axis=0)) / 2
+def test_faces_that_overlap_and_faces_outside_are_warned_of(labeled, settings, printed):
+    uvs = numbers(labeled.data, "UVMap", "vector", 2)
+    layer, middle = labeled.data.uv_layers.active, (uvs.min(axis=0) + uvs.max(axis=0)) / 2
     printed()
     OPS.bake()
     assert "Warning" not in printed().out
     layer.data.foreach_set("uv", (middle - np.abs(uvs - middle)).astype(np.float32).ravel())
-    labelled.data.update()
+    labeled.data.update()
     OPS.bake()
     assert "lies on other faces" in printed().out
     layer.data.foreach_set("uv", (uvs + (0.5, 0)).astype(np.float32).ravel())
-    labelled.data.update()
+    labeled.data.update()
     OPS.bake()
     said = printed().out
     assert "outside of the image" in said
@@ -263,7 +263,7 @@ def test_no_segments_no_bake(settings):
     assert not OPS.bake.poll()
 
 
-def test_cycles_that_is_turned_off_is_named(labelled, monkeypatch):
+def test_cycles_that_is_turned_off_is_named(labeled, monkeypatch):
     from wks_segment.blender.outputs import bake
 
     monkeypatch.setattr(bake, "ENGINE", "NO_SUCH_ENGINE")
@@ -342,13 +342,13 @@ def test_every_pixel_of_a_real_character_has_the_color_of_its_face(command, tmp_
 
 
 @pytest.fixture
-def file(labelled, tmp_path):
-    """A file with a labelled object that has a UV map."""
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "labelled.blend"))
-    return tmp_path / "labelled.blend"
+def file(labeled, tmp_path):
+    """A file with a labeled object that has a UV map."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "labeled.blend"))
+    return tmp_path / "labeled.blend"
 
 
-def test_command_bakes_what_is_labelled(file, command, tmp_path):
+def test_command_bakes_what_is_labeled(file, command, tmp_path):
     output = tmp_path / "map.png"
     done = command("bake", file, "--output", output, "--size", 128, "--palette", "color_blind", "--json")
     assert done.code == 0, done

@@ -19,7 +19,7 @@ def mesh():
 
 @pytest.fixture
 def painted(mesh):
-    """A mesh with materials, colours, attributes and properties of an artist."""
+    """A mesh with materials, colors, attributes and properties of an artist."""
     for name in ("Skin", "Cloth"):
         mesh.materials.append(bpy.data.materials.new(name))
     mesh.materials.append(None)
@@ -73,25 +73,25 @@ def test_vertex_without_a_face_gets_a_label():
     assert numbers(mesh, "wks_segment_vertex").tolist() == [3, 3, 3, 0]
 
 
-def test_each_face_has_one_flat_colour_of_the_palette(mesh):
+def test_each_face_has_one_flat_color_of_the_palette(mesh):
     labels = stripes(mesh)
     write_labels(mesh, labels)
-    colours = mesh.color_attributes["wks_segment_color"]
-    assert colours.domain == "CORNER"
+    colors = mesh.color_attributes["wks_segment_color"]
+    assert colors.domain == "CORNER"
     corners = numbers(mesh, "wks_segment_color", "color_srgb", 4)
     expected = palette()[np.repeat(labels, 3)]
     np.testing.assert_allclose(corners[:, :3], expected, atol=1 / 255)
     np.testing.assert_array_equal(corners[:, 3], 1)
 
 
-def test_colours_are_shown_and_what_is_rendered_stays(painted):
+def test_colors_are_shown_and_what_is_rendered_stays(painted):
     rendered = painted.color_attributes[painted.color_attributes.render_color_index].name
     write_labels(painted, stripes(painted))
     assert painted.color_attributes.active_color.name == "wks_segment_color"
     assert painted.color_attributes[painted.color_attributes.render_color_index].name == rendered
 
 
-def test_without_colours_the_active_colour_stays(painted):
+def test_without_colors_the_active_color_stays(painted):
     write_labels(painted, stripes(painted), colors=False)
     assert "wks_segment_color" not in painted.attributes
     assert painted.color_attributes.active_color.name == "Tint"
@@ -210,7 +210,7 @@ def test_second_write_replaces_the_first(painted):
     assert not [name for name in twice["attributes"] if name.endswith(".001")]
 
 
-def test_second_write_without_colours_and_materials_removes_those_of_the_first(painted):
+def test_second_write_without_colors_and_materials_removes_those_of_the_first(painted):
     before = snapshot(painted)
     write_labels(painted, stripes(painted), materials=True)
     write_labels(painted, stripes(painted), colors=False)
@@ -270,13 +270,13 @@ def test_clear_works_after_the_artist_removed_some_of_it(painted):
     assert painted.color_attributes.active_color.name == "Tint"
 
 
-def test_a_copy_of_a_labelled_mesh_is_cleared_by_itself(painted):
+def test_a_copy_of_a_labeled_mesh_is_cleared_by_itself(painted):
     before = snapshot(painted)
     write_labels(painted, stripes(painted), materials=True)
-    labelled, copy = snapshot(painted), painted.copy()
+    labeled, copy = snapshot(painted), painted.copy()
     clear_labels(copy)
     assert not changes(before, snapshot(copy))
-    assert not changes(labelled, snapshot(painted))
+    assert not changes(labeled, snapshot(painted))
 
 
 def test_materials_that_hang_on_the_object_stay_there(mesh):
@@ -291,7 +291,7 @@ def test_materials_that_hang_on_the_object_stay_there(mesh):
     assert [material.name for material in mesh.materials] == ["On the mesh"]
 
 
-def test_user_of_the_mesh_beside_the_labelled_object_shows_the_labels(mesh):
+def test_user_of_the_mesh_beside_the_labeled_object_shows_the_labels(mesh):
     twin = bpy.data.objects.new("Twin", mesh)
     bpy.context.scene.collection.objects.link(twin)
     labels = stripes(mesh)

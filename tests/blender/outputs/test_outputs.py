@@ -64,7 +64,7 @@ def obj(request, settings):
 
 
 @pytest.fixture
-def labelled(obj):
+def labeled(obj):
     write_labels(obj.data, stripes(obj.data))
     return obj
 
@@ -258,10 +258,10 @@ def islands(mesh, uvs):
 
 
 @pytest.mark.parametrize("method", ["SEAMS", "SMART"])
-def test_segments_are_unwrapped_apart_from_each_other(labelled, method):
-    before = list(labelled.data.uv_layers.keys())
+def test_segments_are_unwrapped_apart_from_each_other(labeled, method):
+    before = list(labeled.data.uv_layers.keys())
     assert OPS.unwrap(method=method) == {"FINISHED"}
-    mesh, labels = labelled.data, labels_of(labelled)
+    mesh, labels = labeled.data, labels_of(labeled)
     assert list(mesh.uv_layers.keys()) == [*before, "WKS Segment"]
     assert mesh.uv_layers.active.name == "WKS Segment"
     assert not before or mesh.uv_layers[0].active_render
@@ -276,9 +276,9 @@ def test_segments_are_unwrapped_apart_from_each_other(labelled, method):
     assert all(len(np.unique(labels[found == island])) == 1 for island in np.unique(found))
 
 
-def test_scale_is_that_of_the_surface(labelled):
+def test_scale_is_that_of_the_surface(labeled):
     OPS.unwrap()
-    mesh, labels = labelled.data, labels_of(labelled)
+    mesh, labels = labeled.data, labels_of(labeled)
     uvs = numbers(mesh, "WKS Segment", "vector", 2).reshape(-1, 3, 2)
     (ux, uy), (vx, vy) = (np.moveaxis(uvs[:, i] - uvs[:, 0], -1, 0) for i in (1, 2))
     in_map, area = np.abs(ux * vy - uy * vx) / 2, np.array([polygon.area for polygon in mesh.polygons])
@@ -311,18 +311,18 @@ def test_vertices_that_an_importer_split_do_not_split_islands():
     np.testing.assert_allclose(found["Split"], found["Whole"], atol=1e-4)
 
 
-def test_a_mesh_full_of_uv_maps_is_refused(labelled):
-    while len(labelled.data.uv_layers) < 8:
-        labelled.data.uv_layers.new()
+def test_a_mesh_full_of_uv_maps_is_refused(labeled):
+    while len(labeled.data.uv_layers) < 8:
+        labeled.data.uv_layers.new()
     before = scene_snapshot()
     with pytest.raises(RuntimeError, match="8 UV maps"):
         OPS.unwrap()
     assert not changes(before, scene_snapshot())
 
 
-def test_unwrapping_changes_nothing_else(labelled):
+def test_unwrapping_changes_nothing_else(labeled):
     other = limbed("Other")
-    select(other, labelled)
+    select(other, labeled)
     before = scene_snapshot()
     OPS.unwrap()
     changed = changes(before, scene_snapshot())
@@ -381,7 +381,7 @@ def test_corrected_vertex_groups_become_segments(obj, settings, kind):
     OPS.segments_from(source="VERTEX_GROUPS")
     found = labels_of(obj)
     assert found[0] == target
-    # Beside the corrected face and its neighbours, a face keeps its segment, or on a border gets one that is there.
+    # Beside the corrected face and its neighbors, a face keeps its segment, or on a border gets one that is there.
     near = [p.index for p in obj.data.polygons if set(p.vertices) & set(corners)]
     kept = np.ones(len(found), dtype=bool)
     kept[near] = False
@@ -416,11 +416,11 @@ def test_nothing_to_take_segments_from_is_named(settings, source):
 
 
 def faces_at(obj):
-    """Sorted centres of an object's faces as they are seen, in world space."""
+    """Sorted centers of an object's faces as they are seen, in world space."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     seen = obj.evaluated_get(depsgraph)
-    centres = [seen.matrix_world @ polygon.center for polygon in seen.to_mesh().polygons]
-    return np.array(sorted([tuple(np.round(centre, 4)) for centre in centres]))
+    centers = [seen.matrix_world @ polygon.center for polygon in seen.to_mesh().polygons]
+    return np.array(sorted([tuple(np.round(center, 4)) for center in centers]))
 
 
 def pieces_of(obj):
@@ -478,32 +478,32 @@ def test_pieces_keep_uvs_and_material_of_each_face(settings):
 
 
 @pytest.mark.parametrize("which", ["pieces", "whole"])
-def test_clear_gives_the_whole_back(labelled, which):
+def test_clear_gives_the_whole_back(labeled, which):
     before = scene_snapshot()
     OPS.separate()
     if which == "whole":
-        labelled.hide_set(False)
-        select(labelled)
+        labeled.hide_set(False)
+        select(labeled)
     OPS.clear()
     clean = scene_snapshot()
-    write_labels(labelled.data, stripes(labelled.data))
+    write_labels(labeled.data, stripes(labeled.data))
     assert not changes(before, scene_snapshot())
     assert list(clean["objects"]) == ["Limbed"]
 
 
-def test_a_piece_that_was_worked_on_stays(labelled, printed):
+def test_a_piece_that_was_worked_on_stays(labeled, printed):
     OPS.separate()
-    first, second = pieces_of(labelled)[:2]
+    first, second = pieces_of(labeled)[:2]
     first.data.vertices[0].co.x += 0.5
     second.name = "Arm"
     printed()
     OPS.clear()
     assert "2 separated objects were worked on since, and stay" in printed().out
     assert sorted(obj.name for obj in bpy.data.objects) == ["Arm", "Limbed", "Segment 1"]
-    assert not pieces_of(labelled)
+    assert not pieces_of(labeled)
 
 
-def test_what_is_separated_is_not_separated_again(labelled):
+def test_what_is_separated_is_not_separated_again(labeled):
     OPS.separate()
     with pytest.raises(RuntimeError, match="is separated already"):
         OPS.separate()
@@ -561,14 +561,14 @@ def test_borders_of_labels():
     assert labels_on(mesh) is None
 
 
-def test_pieces_are_removed_though_the_whole_is_out_of_sight(labelled):
+def test_pieces_are_removed_though_the_whole_is_out_of_sight(labeled):
     """In a collection that is excluded from the view layer, where nothing can be shown or selected."""
     collection = bpy.data.collections.new("Kept")
     bpy.context.scene.collection.children.link(collection)
     OPS.separate()
-    collection.objects.link(labelled)
-    bpy.context.scene.collection.objects.unlink(labelled)
+    collection.objects.link(labeled)
+    bpy.context.scene.collection.objects.unlink(labeled)
     bpy.context.view_layer.layer_collection.children["Kept"].exclude = True
     assert OPS.clear() == {"FINISHED"}
     assert [obj.name for obj in bpy.data.objects] == ["Limbed"]
-    assert not labelled.hide_render
+    assert not labeled.hide_render

@@ -1,24 +1,24 @@
-"""Colours: the same for a segment whatever the number of segments, and clearly different to the eye."""
+"""Colors: the same for a segment whatever the number of segments, and clearly different to the eye."""
 
 import numpy as np
 import pytest
 
 from wks_segment.blender.outputs import palette as module
-from wks_segment.blender.outputs.palette import MAX_COLOURS, colors_of, oklab, palette, sided_palette
+from wks_segment.blender.outputs.palette import MAX_COLORS, colors_of, oklab, palette, sided_palette
 
 
-def test_first_colours_do_not_depend_on_how_many_there_are(monkeypatch):
+def test_first_colors_do_not_depend_on_how_many_there_are(monkeypatch):
     few = module.palette.__wrapped__()
-    monkeypatch.setattr(module, "MAX_COLOURS", 12)
+    monkeypatch.setattr(module, "MAX_COLORS", 12)
     np.testing.assert_array_equal(module.palette.__wrapped__(), few[:12])
 
 
-def test_colours_are_srgb_and_cannot_be_changed_by_accident():
-    colours = palette()
-    assert colours.shape == (MAX_COLOURS, 3)
-    assert ((colours >= 0) & (colours <= 1)).all()
+def test_colors_are_srgb_and_cannot_be_changed_by_accident():
+    colors = palette()
+    assert colors.shape == (MAX_COLORS, 3)
+    assert ((colors >= 0) & (colors <= 1)).all()
     with pytest.raises(ValueError, match="read-only"):
-        colours[0] = 0
+        colors[0] = 0
 
 
 def closest_pair(count):
@@ -27,29 +27,29 @@ def closest_pair(count):
     return distance[np.triu_indices(count, 1)].min()
 
 
-@pytest.mark.parametrize(("count", "least"), [(8, 0.14), (20, 0.08), (MAX_COLOURS, 0.04)])
-def test_no_two_colours_are_close(count, least):
+@pytest.mark.parametrize(("count", "least"), [(8, 0.14), (20, 0.08), (MAX_COLORS, 0.04)])
+def test_no_two_colors_are_close(count, least):
     assert closest_pair(count) > least
 
 
-def test_no_colour_is_dark_or_grey_or_white():
-    colours = palette()
-    lab = oklab(colours)
+def test_no_color_is_dark_or_gray_or_white():
+    colors = palette()
+    lab = oklab(colors)
     assert lab[:, 0].min() >= 0.49
     assert lab[:, 0].max() <= 0.9
     assert np.hypot(lab[:, 1], lab[:, 2]).min() >= 0.08
-    assert colours.max(axis=1).min() > 0.4
+    assert colors.max(axis=1).min() > 0.4
 
 
-def test_parts_in_the_middle_have_the_colours_of_the_palette():
+def test_parts_in_the_middle_have_the_colors_of_the_palette():
     np.testing.assert_array_equal(sided_palette()[0], palette())
     np.testing.assert_array_equal(
-        colors_of(np.array([5, 1005, 2005, 5 + MAX_COLOURS])), sided_palette()[[0, 1, 2, 0], 5]
+        colors_of(np.array([5, 1005, 2005, 5 + MAX_COLORS])), sided_palette()[[0, 1, 2, 0], 5]
     )
 
 
-@pytest.mark.parametrize(("count", "least"), [(8, 0.1), (12, 0.07), (20, 0.05), (MAX_COLOURS, 0.025)])
-def test_no_two_parts_have_close_colours(count, least):
+@pytest.mark.parametrize(("count", "least"), [(8, 0.1), (12, 0.07), (20, 0.05), (MAX_COLORS, 0.025)])
+def test_no_two_parts_have_close_colors(count, least):
     lab = oklab(sided_palette()[:, :count].reshape(-1, 3))
     distance = np.linalg.norm(lab[:, None] - lab[None], axis=2)
     assert distance[np.triu_indices(len(lab), 1)].min() > least
@@ -64,14 +64,14 @@ def test_left_is_light_and_right_is_dark_and_both_are_of_about_one_hue():
     assert away.max() < np.radians(36)
 
 
-def test_no_part_is_black_or_grey_or_white():
+def test_no_part_is_black_or_gray_or_white():
     lab = oklab(sided_palette())
     assert 0.43 < lab[..., 0].min() < lab[..., 0].max() < 0.93
     assert np.hypot(lab[..., 1], lab[..., 2]).min() > 0.055
     assert sided_palette().max(axis=2).min() > 0.3
 
 
-def test_oklab_of_known_colours():
+def test_oklab_of_known_colors():
     """The values that Ottosson gives for the primaries, to three digits."""
     primaries = np.array([[1.0, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]])
     known = [[1, 0, 0], [0.628, 0.225, 0.126], [0.866, -0.234, 0.179], [0.452, -0.032, -0.312], [0, 0, 0]]
@@ -89,7 +89,7 @@ BLINDNESS = {
 
 
 def as_seen(srgb, eyes):
-    """sRGB colours as somebody sees them."""
+    """sRGB colors as somebody sees them."""
     light = np.clip(module.linear(srgb) @ np.array(eyes).T, 0, 1)
     return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
 
@@ -100,7 +100,7 @@ def closest(srgb):
     return distance[np.triu_indices(len(lab), 1)].min()
 
 
-@pytest.mark.parametrize(("count", "least"), [(4, 0.3), (8, 0.14), (12, 0.11), (16, 0.1), (MAX_COLOURS, 0.04)])
+@pytest.mark.parametrize(("count", "least"), [(4, 0.3), (8, 0.14), (12, 0.11), (16, 0.1), (MAX_COLORS, 0.04)])
 @pytest.mark.parametrize("eyes", [np.eye(3), *BLINDNESS.values()], ids=["all cones", *BLINDNESS])
 def test_color_blind_safe_colors_are_told_apart_without_a_kind_of_cones(eyes, count, least):
     assert closest(as_seen(palette("color_blind")[:count], eyes)) > least
@@ -118,7 +118,7 @@ def test_the_calm_palette_is_not_color_blind_safe():
     assert min(closest(as_seen(palette()[:8], eyes)) for eyes in BLINDNESS.values()) < 0.06
 
 
-@pytest.mark.parametrize(("count", "least"), [(8, 0.27), (16, 0.17), (MAX_COLOURS, 0.09)])
+@pytest.mark.parametrize(("count", "least"), [(8, 0.27), (16, 0.17), (MAX_COLORS, 0.09)])
 def test_maximally_different_colors_are_farther_apart_than_the_calm_ones(count, least):
     assert closest(palette("maximal")[:count]) > max(least, 1.2 * closest(palette()[:count]))
 
@@ -126,10 +126,10 @@ def test_maximally_different_colors_are_farther_apart_than_the_calm_ones(count, 
 @pytest.mark.parametrize("name", module.RECIPES)
 def test_every_palette_is_srgb_and_has_nothing_black_and_a_left_lighter_than_the_right(name):
     colors = sided_palette(name)
-    assert colors.shape == (3, MAX_COLOURS, 3)
+    assert colors.shape == (3, MAX_COLORS, 3)
     assert ((colors >= 0) & (colors <= 1)).all()
     middle, left, right = oklab(colors)
     assert middle[:, 0].min() > 0.24
     assert left[:, 0].min() > right[:, 0].max() + 0.04
     in_bytes = np.rint(255 * colors).reshape(-1, 3)
-    assert len(np.unique(in_bytes, axis=0)) == 3 * MAX_COLOURS
+    assert len(np.unique(in_bytes, axis=0)) == 3 * MAX_COLORS

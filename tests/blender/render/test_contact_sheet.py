@@ -39,10 +39,10 @@ def pixels(path):
     return values.reshape(height, width, -1)[::-1, :, :3]
 
 
-def hues(colours):
-    """Hue in turns and saturation of (…, 3) colours."""
-    low, high = colours.min(axis=-1), colours.max(axis=-1)
-    red, green, blue = np.moveaxis(colours, -1, 0)
+def hues(colors):
+    """Hue in turns and saturation of (…, 3) colors."""
+    low, high = colors.min(axis=-1), colors.max(axis=-1)
+    red, green, blue = np.moveaxis(colors, -1, 0)
     angle = np.arctan2(np.sqrt(3) * (green - blue), 2 * red - green - blue) / (2 * np.pi) % 1
     return angle, (high - low) / np.maximum(high, 1e-6)
 
@@ -55,7 +55,7 @@ def share_of(component, image):
     return ((np.minimum(away, 1 - away) < 0.03) & (saturation > 0.25)).mean()
 
 
-def test_picture_shows_each_pose_in_the_colours_of_its_parts(tmp_path):
+def test_picture_shows_each_pose_in_the_colors_of_its_parts(tmp_path):
     path = tmp_path / "poses.png"
     render_poses(tiles(2), path)
     image = pixels(path)
@@ -68,7 +68,7 @@ def test_picture_shows_each_pose_in_the_colours_of_its_parts(tmp_path):
         assert 0.3 < background.mean() < 0.95
 
 
-def test_picture_shows_the_colours_that_the_user_gave(tmp_path):
+def test_picture_shows_the_colors_that_the_user_gave(tmp_path):
     path, given = tmp_path / "poses.png", {part: palette()[1] for part in SHOWN}
     render_poses(tiles(1), path, style=Style(colors=given))
     image = pixels(path)

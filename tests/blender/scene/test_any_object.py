@@ -35,7 +35,7 @@ def ended(operator):
         assert "Traceback" not in reason, reason
         assert not changes(before, scene_snapshot())
         return "refused"
-    return "labelled"
+    return "labeled"
 
 
 @pytest.mark.parametrize("action", ["learn", "apply"])
@@ -52,7 +52,7 @@ def test_operators_end_or_refuse_and_clear_gives_everything_back(model_file, act
         OPS.load_model(filepath=str(model_file))
     untouched = scene_snapshot()["meshes"]
     outcome = ended(getattr(OPS, action))
-    if outcome == "labelled":
+    if outcome == "labeled":
         values = np.empty(len(obj.data.polygons), dtype=np.int32)
         obj.data.attributes["wks_segment"].data.foreach_get("value", values)
         assert set(values.tolist()) <= {0, 1, 2}

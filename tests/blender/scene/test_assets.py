@@ -139,7 +139,7 @@ def test_materials_that_other_objects_use_too_stay_as_they_are():
 # States of an object
 
 
-def test_hidden_faces_are_labelled_too_and_stay_hidden():
+def test_hidden_faces_are_labeled_too_and_stay_hidden():
     obj = limbed()
     hidden = np.zeros(len(obj.data.polygons), dtype=bool)
     hidden[::3] = True

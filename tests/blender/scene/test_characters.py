@@ -20,10 +20,10 @@ def test_real_character_is_segmented(command, tmp_path, name):
     assert not any("the same" in warning for warning in done.result["warnings"])
     assert 4 <= done.result["segments"] <= 8
     bpy.ops.wm.open_mainfile(filepath=str(output))
-    labelled = [obj for obj in bpy.data.objects if obj.type == "MESH" and "wks_segment" in obj.data.attributes]
-    assert labelled
+    labeled = [obj for obj in bpy.data.objects if obj.type == "MESH" and "wks_segment" in obj.data.attributes]
+    assert labeled
     seen = set()
-    for obj in labelled:
+    for obj in labeled:
         values = np.empty(len(obj.data.polygons), dtype=np.int32)
         obj.data.attributes["wks_segment"].data.foreach_get("value", values)
         seen |= set(values.tolist())

@@ -79,7 +79,7 @@ def test_polygons_of_several_objects_are_numbered_one_after_another(marked):
     assert pairs(strip("First", -9.0), marked) == {(4, 5), (5, 6), (6, 7)}
 
 
-def test_polygons_are_neighbours_across_split_vertices():
+def test_polygons_are_neighbors_across_split_vertices():
     obj = split_strip()
     obj.data.polygons[2].material_index = 1
     right_of_0 = next(edge for edge in obj.data.edges if edge.key == (1, 2))
@@ -88,7 +88,7 @@ def test_polygons_are_neighbours_across_split_vertices():
     assert pairs(obj, kinds={"seams"}) == {(0, 1)}
 
 
-def test_all_polygons_at_an_edge_of_three_are_neighbours():
+def test_all_polygons_at_an_edge_of_three_are_neighbors():
     fan = mesh_object([(0, 0, 0), (0, 0, 1), (1, 0, 0), (0, 1, 0), (-1, 0, 0)], [(0, 1, 2), (0, 1, 3), (0, 1, 4)])
     next(edge for edge in fan.data.edges if edge.key == (0, 1)).use_edge_sharp = True
     assert pairs(fan) == {(0, 1), (0, 2), (1, 2)}
@@ -106,7 +106,7 @@ def test_mesh_whose_polygons_all_lie_at_one_place_is_read():
     assert len(pairs(heap)) < 100 * 100 / 2
 
 
-def neighbours_of(mesh):
+def neighbors_of(mesh):
     """(q, 2) polygons at each edge, and the edge, of a closed mesh."""
     edge = np.empty(len(mesh.loops), dtype=np.int32)
     mesh.loops.foreach_get("edge_index", edge)
@@ -115,7 +115,7 @@ def neighbours_of(mesh):
 
 def ring_beside_a_border(obj):
     """Mark the edges around the part at the tip of the longest limb, grown by a face; gives their number."""
-    beside, edge = neighbours_of(obj.data)
+    beside, edge = neighbors_of(obj.data)
     inside = labels_of(obj) == labels_of(obj)[np.argmax([p.center.x for p in obj.data.polygons])]
     grown = inside.copy()
     grown[beside[inside[beside].any(axis=1)]] = True
@@ -127,7 +127,7 @@ def ring_beside_a_border(obj):
 
 def marked_border(obj):
     """Number of marked edges that lie on a border."""
-    beside, edge = neighbours_of(obj.data)
+    beside, edge = neighbors_of(obj.data)
     seams = np.empty(len(obj.data.edges), dtype=bool)
     obj.data.edges.foreach_get("use_seam", seams)
     labels = labels_of(obj)[beside]

@@ -163,7 +163,7 @@ def test_ngons_are_triangulated_and_know_their_polygon():
         assert set(triangle) <= corners[polygon]
 
 
-def polygon_centres(obj):
+def polygon_centers(obj):
     return np.array([polygon.center for polygon in obj.data.polygons])
 
 
@@ -219,8 +219,8 @@ def test_subdivided_faces_map_to_the_own_polygons():
     assert pose.mesh.n_faces == 6 * len(obj.data.polygons)
     assert np.bincount(pose.polygon_of).tolist() == [6] * len(obj.data.polygons)
     middles = pose.mesh.vertices[pose.mesh.faces].mean(axis=1)
-    away = np.linalg.norm(middles - polygon_centres(obj)[pose.polygon_of], axis=1)
-    nearest = np.linalg.norm(middles[:, None] - polygon_centres(obj)[None], axis=2).min(axis=1)
+    away = np.linalg.norm(middles - polygon_centers(obj)[pose.polygon_of], axis=1)
+    nearest = np.linalg.norm(middles[:, None] - polygon_centers(obj)[None], axis=2).min(axis=1)
     assert (away < nearest + 0.2).all()
 
 
@@ -230,7 +230,7 @@ def test_mirrored_faces_map_to_the_own_polygons_on_both_sides():
     pose = read(obj)
     assert np.bincount(pose.polygon_of).tolist() == [4] * 6
     middles = pose.mesh.vertices[pose.mesh.faces].mean(axis=1)
-    own = polygon_centres(obj)[pose.polygon_of]
+    own = polygon_centers(obj)[pose.polygon_of]
     np.testing.assert_allclose(np.abs(middles[:, 0]), own[:, 0], atol=0.2)
     assert (middles[:, 0] < 0).sum() == 12
 
@@ -458,7 +458,7 @@ def learn(settings, *objects, **values):
     assert bpy.ops.wks_segment.learn() == {"FINISHED"}
 
 
-def test_polygons_that_a_modifier_hides_are_labelled_like_their_neighbours(settings):
+def test_polygons_that_a_modifier_hides_are_labeled_like_their_neighbors(settings):
     obj = limbed()
     learn(settings, obj)
     obj.modifiers.new("Decimate", "DECIMATE").ratio = 0.4
@@ -466,8 +466,8 @@ def test_polygons_that_a_modifier_hides_are_labelled_like_their_neighbours(setti
     assert hidden.sum() > 100, "the modifier hides nothing: the test is void"
     bpy.ops.wks_segment.apply()
     labels = labels_of(obj)
-    centres = np.array([polygon.center for polygon in obj.data.polygons])
-    distances = np.linalg.norm(centres[hidden][:, None] - centres[~hidden], axis=2)
+    centers = np.array([polygon.center for polygon in obj.data.polygons])
+    distances = np.linalg.norm(centers[hidden][:, None] - centers[~hidden], axis=2)
     # Several can be equally near: it is the label of one of them.
     nearest = distances <= distances.min(axis=1, keepdims=True) * (1 + 1e-4)
     alike = labels[hidden][:, None] == labels[~hidden]

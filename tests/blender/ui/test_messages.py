@@ -139,7 +139,7 @@ def test_all_messages_of_the_code_have_a_german_text():
     said = {text for text in IN_CODE if is_said(text)} - {*GERMAN, *GERMAN_NAMES, *NOT_SHOWN, *PYTHON}
     assert said - KNOWN.keys() == set()
     shown = {text for text in words() if isinstance(text, str) and text}
-    assert {"Learned", "Updated", "Import", "curve", "Starting", "Cancelling", "There is only one segment"} <= shown
+    assert {"Learned", "Updated", "Import", "curve", "Starting", "Canceling", "There is only one segment"} <= shown
     assert shown - KNOWN.keys() == set()
 
 
@@ -270,18 +270,18 @@ class Blender:
 
 
 @pytest.mark.parametrize(
-    ("locale", "reported", "grey"),
+    ("locale", "reported", "gray"),
     [
         ("de_DE", "a.json wurde nicht geladen: ", "Noch kein Modell: "),
         ("", "a.json was not loaded: ", "No model yet: "),
         ("fr_FR", "a.json was not loaded: ", "No model yet: "),
     ],
 )
-def test_operators_speak_the_language_of_the_interface(extension, scene, monkeypatch, tmp_path, locale, reported, grey):
+def test_operators_speak_the_language_of_the_interface(extension, scene, monkeypatch, tmp_path, locale, reported, gray):
     monkeypatch.setattr(messages, "bpy", Blender(locale))
     with pytest.raises(RuntimeError, match=reported):
         bpy.ops.wks_segment.load_model(filepath=str(tmp_path / "a.json"))
-    with pytest.raises(RuntimeError, match=grey):
+    with pytest.raises(RuntimeError, match=gray):
         bpy.ops.wks_segment.duplicate_model()
 
 

@@ -114,7 +114,7 @@ def test_what_is_shown_goes_when_it_is_of_yesterday(walker, settings, session, h
 
 
 def test_the_picture_is_of_what_is_seen(walker, settings, session):
-    """At another frame, through a modifier, a little above the surface, in the colours of the parts, shaded."""
+    """At another frame, through a modifier, a little above the surface, in the colors of the parts, shaded."""
     walker.modifiers.new("Fine", "SUBSURF").levels = 1
     bpy.context.scene.frame_set(11)
     work = session.work

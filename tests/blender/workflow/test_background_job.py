@@ -205,10 +205,10 @@ def test_escape_ends_it_at_every_stage_and_nothing_is_written(poses, at, stage):
     ran, go_on = at(stage)
     assert ran.modal(bpy.context, SimpleNamespace(type="MOUSEMOVE", value="NOTHING")) == GOING
     assert ran.modal(bpy.context, SimpleNamespace(type="ESC", value="PRESS")) == {"RUNNING_MODAL"}
-    assert ran.job.lines == ("Cancelling", "")
+    assert ran.job.lines == ("Canceling", "")
     go_on()
     assert ended(ran) == {"CANCELLED"}
-    assert ran.said == [("WARNING", "Learn and Segment was cancelled, nothing is written")]
+    assert ran.said == [("WARNING", "Learn and Segment was canceled, nothing is written")]
     assert not changes(before, scene_snapshot())
 
 
@@ -220,11 +220,11 @@ def test_button_ends_applying(poses, at, stage):
     assert OPS.cancel() == {"FINISHED"}
     go_on()
     assert ended(ran) == {"CANCELLED"}
-    assert ran.said == [("WARNING", "Apply to Selected was cancelled, nothing is written")]
+    assert ran.said == [("WARNING", "Apply to Selected was canceled, nothing is written")]
     assert not changes(before, scene_snapshot())
 
 
-def test_button_is_grey_where_no_job_runs():
+def test_button_is_gray_where_no_job_runs():
     assert not OPS.cancel.poll()
     with pytest.raises(RuntimeError, match="No job is running"):
         OPS.cancel()
@@ -530,7 +530,7 @@ def test_panel_shows_how_far_it_is_and_why_it_ended(poses, at):
     ended(ran)
     column = drawn()
     lines = [call.kwargs["text"] for call in column.label.call_args_list]
-    assert " ".join(lines) == "Learn and Segment was cancelled, nothing is written"
+    assert " ".join(lines) == "Learn and Segment was canceled, nothing is written"
     assert not column.row.return_value.progress.called
 
 

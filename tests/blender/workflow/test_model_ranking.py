@@ -90,7 +90,7 @@ def test_what_is_gone_is_said(two):
     assert two.models[two.used_model].name == "Box"
 
 
-def test_without_a_model_or_a_ranking_the_buttons_are_grey(settings):
+def test_without_a_model_or_a_ranking_the_buttons_are_gray(settings):
     select(limbed())
     assert not OPS.rank.poll()
     assert not OPS.apply_ranked.poll()

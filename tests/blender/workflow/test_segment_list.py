@@ -38,10 +38,10 @@ RED = (1.0, 0.0, 0.0)
 
 def bands(obj):
     """A part by height: 0 below and at the end of a limb, 1 in the middle, 1002 and 2002 above, by side."""
-    centres = np.array([polygon.center for polygon in obj.data.polygons])
-    above = np.where(centres[:, 0] > 0, 1002, 2002)
-    above = np.where(centres[:, 0] > 2.2, 0, above)
-    return np.where(centres[:, 2] > 0.4, above, np.where(centres[:, 2] > -0.2, 1, 0))
+    centers = np.array([polygon.center for polygon in obj.data.polygons])
+    above = np.where(centers[:, 0] > 0, 1002, 2002)
+    above = np.where(centers[:, 0] > 2.2, 0, above)
+    return np.where(centers[:, 2] > 0.4, above, np.where(centers[:, 2] > -0.2, 1, 0))
 
 
 def write(settings, *objects):
@@ -58,7 +58,7 @@ def write_labels(settings, labels, report=None, renumbered=False):
 
 @pytest.fixture
 def pair(settings):
-    """Two objects with parts 0, 1, 1002 and 2002, in colours, materials and hard vertex groups."""
+    """Two objects with parts 0, 1, 1002 and 2002, in colors, materials and hard vertex groups."""
     settings.write_materials, settings.vertex_groups = True, "hard"
     objects = [limbed("First"), limbed("Second", bend=0.5)]
     select(*objects)
@@ -72,7 +72,7 @@ def activate(settings, part):
 
 
 def colors_at(obj, part):
-    """The different colours, in 0 to 255, at the corners of a part's faces."""
+    """The different colors, in 0 to 255, at the corners of a part's faces."""
     at = np.repeat(labels_of(obj) == part, [len(polygon.vertices) for polygon in obj.data.polygons])
     return np.unique(np.rint(255 * numbers(obj.data, "wks_segment_color", "color_srgb", 4)[at, :3]), axis=0).tolist()
 
@@ -98,7 +98,7 @@ def corners_of(obj, part):
 
 
 def all_agrees(obj, settings):
-    """Colours, materials, groups and the vertices' attribute say what the faces' labels and the list say."""
+    """Colors, materials, groups and the vertices' attribute say what the faces' labels and the list say."""
     style, found = settings.style(), part_ids.among(labels_of(obj))
     for part in found:
         expected = np.rint(255 * style.colors_of(np.array(part)))
@@ -167,12 +167,12 @@ def test_learn_apply_and_clear_fill_the_list(settings):
     ["select_segment", "hide_segment", "isolate_segment", "show_segments", "name_segment", "merge_segments",
      "split_segment", "assign_faces", "new_segment", "forget_faces", "restore_segments"],
 )  # fmt: skip
-def test_buttons_are_grey_without_segments(name):
+def test_buttons_are_gray_without_segments(name):
     select(limbed())
     assert not getattr(OPS, name).poll()
 
 
-# Names and colours
+# Names and colors
 
 
 def test_a_new_name_is_written_everywhere_and_to_the_other_side(pair, settings):
@@ -379,9 +379,9 @@ def test_split_makes_parts_of_connected_pieces_the_same_on_all_meshes(settings):
     assert len({tuple(item.color) for item in settings.segments}) == 4
     directions = []
     for obj in objects:
-        labels, centres = labels_of(obj), coordinates_of_faces(obj)
+        labels, centers = labels_of(obj), coordinates_of_faces(obj)
         np.testing.assert_array_equal(labels != 0, tips[obj])
-        middle = np.array([centres[labels == part].mean(axis=0) for part in (3, 500, 501)])
+        middle = np.array([centers[labels == part].mean(axis=0) for part in (3, 500, 501)])
         directions.append(middle / np.linalg.norm(middle, axis=1)[:, None])
     np.testing.assert_allclose(directions[2], directions[0], atol=0.1)
     assert ((directions[1] * directions[0]).sum(axis=1) > 0.9).all()
@@ -401,9 +401,9 @@ def coordinates_of_faces(obj):
 def test_split_leaves_crumbs_with_the_nearest_piece_and_a_single_piece_alone(settings, printed):
     obj = limbed()
     select(obj)
-    centres = coordinates_of_faces(obj)
-    labels = np.where(np.linalg.norm(centres, axis=1) > 1.25, 3, 0)
-    crumb = int(np.argmin(np.linalg.norm(centres, axis=1)))
+    centers = coordinates_of_faces(obj)
+    labels = np.where(np.linalg.norm(centers, axis=1) > 1.25, 3, 0)
+    crumb = int(np.argmin(np.linalg.norm(centers, axis=1)))
     labels[crumb] = 3
     settings.min_share = 1.0
     write_labels(settings, {Character((obj,)): labels})

@@ -1,4 +1,4 @@
-"""Left and right: told apart where the character is at rest, named and coloured, on request only."""
+"""Left and right: told apart where the character is at rest, named and colored, on request only."""
 
 import bpy
 import numpy as np
@@ -212,7 +212,7 @@ def test_sides_are_the_same_on_another_pose_and_meshing_after_a_file(learned, se
 # Outputs
 
 
-def test_colours_of_left_and_right_are_written(learned):
+def test_colors_of_left_and_right_are_written(learned):
     corners = numbers(learned.data, "wks_segment_color", "color_srgb", 4)[:, :3]
     labels = np.repeat(labels_of(learned), [len(polygon.vertices) for polygon in learned.data.polygons])
     expected = sided_palette()[labels // 1000, labels % 1000]

@@ -154,18 +154,18 @@ def test_what_was_not_learned_is_numbered_on(model):
 
 
 def test_sides_need_one_of_the_same_segment_opposite():
-    centres = np.array([(1, 0, 0), (-1, 0.1, 0), (0.01, 0, 1), (0.9, 0, -2), (-0.9, 0, -2), (2, 0, 3)])
+    centers = np.array([(1, 0, 0), (-1, 0.1, 0), (0.01, 0, 1), (0.9, 0, -2), (-0.9, 0, -2), (2, 0, 3)])
     none = np.arange(6)
-    assert sides(centres, np.array([0, 0, 1, 2, 2, 3]), none).tolist() == [1, -1, 0, 1, -1, 0]
-    assert sides(centres, np.array([0, 1, 1, 2, 2, 3]), none).tolist() == [0, 0, 0, 1, -1, 0]
+    assert sides(centers, np.array([0, 0, 1, 2, 2, 3]), none).tolist() == [1, -1, 0, 1, -1, 0]
+    assert sides(centers, np.array([0, 1, 1, 2, 2, 3]), none).tolist() == [0, 0, 0, 1, -1, 0]
 
 
 def test_bent_sides_are_told_from_which_is_which_in_the_mirror_image():
     """Four limbs of one segment that have swung to and fro: mirroring brings none to the one opposite."""
-    centres = np.array([(0.5, 1, 0), (-0.1, 0, 0), (0.4, -2, 0), (-0.2, -1, 0), (0.0, 9, 0)])
+    centers = np.array([(0.5, 1, 0), (-0.1, 0, 0), (0.4, -2, 0), (-0.2, -1, 0), (0.0, 9, 0)])
     segment = np.zeros(5, dtype=int)
-    assert sides(centres, segment, np.arange(5)).tolist() != [1, -1, 1, -1, 0]
-    assert sides(centres, segment, np.array([1, 0, 3, 2, 5])).tolist() == [1, -1, 1, -1, 0]
+    assert sides(centers, segment, np.arange(5)).tolist() != [1, -1, 1, -1, 0]
+    assert sides(centers, segment, np.array([1, 0, 3, 2, 5])).tolist() == [1, -1, 1, -1, 0]
 
 
 def test_left_is_told_from_a_bent_pose_alone():
@@ -188,8 +188,8 @@ def test_in_poses_of_one_mesh_the_order_says_which_region_is_which(model):
         known.distance[np.ix_(order, order)],
     )  # fmt: skip
     assert np.abs(known.handedness[left] - known.handedness[right]).max() > 0.01
-    centres = np.zeros((len(order), 3))
-    found = RegionAtlas.learned(model.regions_.n_groups, [known, swapped], centres)
+    centers = np.zeros((len(order), 3))
+    found = RegionAtlas.learned(model.regions_.n_groups, [known, swapped], centers)
     np.testing.assert_allclose(found.traits.handedness, known.handedness)
-    in_order = RegionAtlas.learned(model.regions_.n_groups, [known, swapped], centres, alike=True)
+    in_order = RegionAtlas.learned(model.regions_.n_groups, [known, swapped], centers, alike=True)
     np.testing.assert_allclose(in_order.traits.handedness, (known.handedness + swapped.handedness) / 2)

@@ -13,7 +13,7 @@ EVEN = np.full(4, 0.25)
 
 
 def overlaps(areas, shared=0.02):
-    """Posteriors that are sure but for a little between neighbours in the row."""
+    """Posteriors that are sure but for a little between neighbors in the row."""
     table = np.diag(areas - shared)
     table[[0, 1, 2], [1, 2, 3]] = shared / 2
     return table + np.triu(table, 1).T

@@ -35,14 +35,14 @@ def test_labels_or_a_reason(drawn):
         labels, regions, score = model.segment_faces(pose), model.segment_regions(pose), model.score(pose)
     except (ValueError, SpectrumError) as error:
         assert len(str(error)) > 20, error
-        count("mesh, labelled by a model", names, "refused")
+        count("mesh, labeled by a model", names, "refused")
         return
     assert labels.shape == (len(faces),)
     assert set(labels.tolist()) <= {0, 1, 2}
     assert regions.shape == (len(faces),)
     assert regions.min() >= 0
     assert np.isfinite(score)
-    count("mesh, labelled by a model", names, "labelled")
+    count("mesh, labeled by a model", names, "labeled")
 
 
 @given(any_mesh())

@@ -9,8 +9,8 @@ from wks_segment.core.mesh.repair import small_holes, without_spikes
 
 
 def without_faces_near(mesh, vertex, radius):
-    centres = mesh.vertices[mesh.faces].mean(axis=1)
-    return TriangleMesh(mesh.vertices, mesh.faces[np.linalg.norm(centres - mesh.vertices[vertex], axis=1) > radius])
+    centers = mesh.vertices[mesh.faces].mean(axis=1)
+    return TriangleMesh(mesh.vertices, mesh.faces[np.linalg.norm(centers - mesh.vertices[vertex], axis=1) > radius])
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -22,7 +22,7 @@ def test_no_edge_is_longer_and_the_surface_is_the_same(mesh, share):
     new_edges, _, new_count = unique_edges(faces)
     new_lengths = np.linalg.norm(vertices[new_edges[:, 0]] - vertices[new_edges[:, 1]], axis=1)
     assert new_lengths.max() <= longest
-    # As many borders as before, now in pieces: no vertex lies on an edge of a neighbour.
+    # As many borders as before, now in pieces: no vertex lies on an edge of a neighbor.
     assert new_lengths[new_count == 1].sum() == pytest.approx(lengths[count == 1].sum())
     assert (new_count <= 2).all()
     assert len(np.unique(faces)) == len(vertices)

@@ -45,9 +45,9 @@ def test_refining_is_flat_and_as_often_as_needed(min_vertices):
     surface = prepare_surface(coarse, min_vertices)
     assert surface.mesh.n_vertices >= min_vertices
     assert surface.mesh.area == pytest.approx(coarse.area)
-    # The value of a face is the mean over its pieces: for coordinates, its centre.
-    centres = coarse.vertices[coarse.faces].mean(axis=1)
-    np.testing.assert_allclose(surface.to_faces(surface.mesh.vertices), centres, atol=1e-12)
+    # The value of a face is the mean over its pieces: for coordinates, its center.
+    centers = coarse.vertices[coarse.faces].mean(axis=1)
+    np.testing.assert_allclose(surface.to_faces(surface.mesh.vertices), centers, atol=1e-12)
 
 
 def test_a_vertex_without_a_face_takes_the_nearest_ones_value():

@@ -116,7 +116,7 @@ def test_how_loose_parts_are_tied_matters(cache):
     assert (cache.hits, cache.misses) == (0, 3)
 
 
-def test_poses_that_were_done_are_kept_when_a_job_is_cancelled():
+def test_poses_that_were_done_are_kept_when_a_job_is_canceled():
     cache, poses = Counting(MemoryCache()), [creature(bend, 3) for bend in (0.0, 0.2, 0.4)]
 
     def cancel(stage, share):

@@ -13,7 +13,7 @@ LAST_FRAME = 48
 class Joint(NamedTuple):
     """One joint of the skeleton and the end of the bone of the same name, which starts at `parent`.
 
-    Metres; the creature looks along −Y and stands on Z = 0. A name ending in ``.L`` stands for a pair:
+    Meters; the creature looks along −Y and stands on Z = 0. A name ending in ``.L`` stands for a pair:
     the joint and its mirror image ``.R`` at −X.
     """
 
@@ -117,9 +117,9 @@ HINGE = Vector((-1.0, 0.0, 0.0))
 
 
 class Ring(NamedTuple):
-    """A ring of the cage: its centre and radius in metres, the bones that move it, the ring it continues."""
+    """A ring of the cage: its center and radius in meters, the bones that move it, the ring it continues."""
 
-    centre: Vector
+    center: Vector
     radius: float
     weights: dict[str, float]
     previous: int
@@ -171,9 +171,9 @@ def _rings(joints: list[Joint]) -> list[Ring]:
             # Half and half at a hinge, all to the bone at its middle: a smooth bend, and no limb pulls at
             # another. Where limbs branch off, the trunk stays stiff.
             weights = {name: 1.0}
-            neighbours = [parent.name] if t < 0.5 else children[name]
-            if len(neighbours) == 1:
-                weights = {name: 1.0 - abs(t - 0.5), neighbours[0]: abs(t - 0.5)}
+            neighbors = [parent.name] if t < 0.5 else children[name]
+            if len(neighbors) == 1:
+                weights = {name: 1.0 - abs(t - 0.5), neighbors[0]: abs(t - 0.5)}
             rings.append(Ring(start.lerp(end, t), (1 - t) * parent.radius + t * radius, weights, previous))
             previous = len(rings) - 1
         if not children[name]:
@@ -188,7 +188,7 @@ def _build_body(scene: bpy.types.Scene, joints: list[Joint]) -> bpy.types.Object
     rings = _rings(joints)
     edges = [(ring.previous, i) for i, ring in enumerate(rings) if ring.previous >= 0]
     sketch = bpy.data.meshes.new("Creature sketch")
-    sketch.from_pydata([ring.centre for ring in rings], edges, [])
+    sketch.from_pydata([ring.center for ring in rings], edges, [])
     body = bpy.data.objects.new("Creature", sketch)
     scene.collection.objects.link(body)
     groups = {joint.name: body.vertex_groups.new(name=joint.name) for joint in joints}

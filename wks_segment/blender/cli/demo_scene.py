@@ -37,7 +37,7 @@ def run(
 ) -> dict[str, Any]:  # fmt: skip
     """Learn a character's parts from frames of its animation and check them on other frames.
 
-    Writes `path` with the suffixes .blend (the labelled character), .png (all poses side by side) and .json (the
+    Writes `path` with the suffixes .blend (the labeled character), .png (all poses side by side) and .json (the
     model).
 
     Returns

@@ -45,7 +45,7 @@ def answer(arguments: list[str]) -> Answer:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="wks_segment", description="The same parts, labels and colours in every pose of a character."
+        prog="wks_segment", description="The same parts, labels and colors in every pose of a character."
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for module in COMMANDS:

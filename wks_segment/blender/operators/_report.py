@@ -29,7 +29,7 @@ def tell(operator: bpy.types.Operator, kind: set[str], text: str) -> None:
 
 
 def explain(cls: type[bpy.types.Operator], text: str) -> None:
-    """Say in the tooltip of a grey button why it is."""
+    """Say in the tooltip of a gray button why it is."""
     cls.poll_message_set(in_tooltip(text))
 
 
@@ -97,7 +97,7 @@ def has_selected_mesh(cls: type[bpy.types.Operator], context: bpy.types.Context)
     return True
 
 
-def has_labelled_mesh(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+def has_labeled_mesh(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """For `poll`: whether a selected mesh has segments; sets the message if not."""
     if not any(has_labels(obj.data) for obj in selected_meshes(context)):
         explain(cls, "Select an object that has segments")

@@ -64,7 +64,7 @@ class WKS_SEGMENT_OT_forget_faces(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
         chosen_only = context.mode == "EDIT_MESH"
-        objects, count = segment_list.labelled(settings), 0
+        objects, count = segment_list.labeled(settings), 0
         with segment_list.object_mode(context):
             for mesh in segment_list.meshes_of(objects):
                 given = by_hand(mesh)
@@ -80,7 +80,7 @@ def _assign(operator: bpy.types.Operator, context: bpy.types.Context, part: int 
     """Give the selected faces to a part; None: to a new one."""
     settings = context.scene.wks_segment
     # Faces of objects that are not in Edit Mode can be selected too, unseen.
-    objects = [obj for obj in segment_list.labelled(settings) if obj.mode == "EDIT"]
+    objects = [obj for obj in segment_list.labeled(settings) if obj.mode == "EDIT"]
     with segment_list.object_mode(context):
         chosen = {mesh: values(mesh.polygons, "select", bool) for mesh in segment_list.meshes_of(objects)}
         count = sum(int(selected.sum()) for selected in chosen.values())

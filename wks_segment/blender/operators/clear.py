@@ -20,7 +20,7 @@ class WKS_SEGMENT_OT_clear(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _report.in_object_mode(cls, context) and _report.has_labelled_mesh(cls, context)
+        return _report.in_object_mode(cls, context) and _report.has_labeled_mesh(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         chosen = selected_meshes(context)

@@ -51,7 +51,7 @@ class WKS_SEGMENT_OT_duplicate_model(bpy.types.Operator):
 
 
 class WKS_SEGMENT_OT_remove_model(bpy.types.Operator):
-    """Remove the active model from this scene. What it labelled stays"""
+    """Remove the active model from this scene. What it labeled stays"""
 
     bl_idname = "wks_segment.remove_model"
     bl_label = "Remove Model"

@@ -31,7 +31,7 @@ class WKS_SEGMENT_OT_restore_segments(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
-        for mesh in segment_list.meshes_of(segment_list.labelled(settings)):
+        for mesh in segment_list.meshes_of(segment_list.labeled(settings)):
             keep_by_hand(mesh, np.full(len(mesh.polygons), -1))
         settings.keep_notes(replace(settings.notes(), joined={}))
         segment_list.rewrite_all(settings)

@@ -31,7 +31,7 @@ class WKS_SEGMENT_OT_select_segment(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
         part = segment_list.active_part(settings)
-        objects = [obj for obj in segment_list.labelled(settings) if obj.visible_get()]
+        objects = [obj for obj in segment_list.labeled(settings) if obj.visible_get()]
         if context.mode == "EDIT_MESH":
             objects = [obj for obj in objects if obj.mode == "EDIT"]
         if part is None or not objects:

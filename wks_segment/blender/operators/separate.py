@@ -23,7 +23,7 @@ class WKS_SEGMENT_OT_separate(bpy.types.Operator):
         return (
             _report.no_job_runs(cls, context)
             and _report.in_object_mode(cls, context)
-            and _report.has_labelled_mesh(cls, context)
+            and _report.has_labeled_mesh(cls, context)
         )
 
     def execute(self, context: bpy.types.Context) -> set[str]:

@@ -28,7 +28,7 @@ class _Shows:
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
-        meshes, count = segment_list.meshes_of(segment_list.labelled(settings)), 0
+        meshes, count = segment_list.meshes_of(segment_list.labeled(settings)), 0
         with segment_list.object_mode(context):
             for mesh in meshes:
                 labels = labels_on(mesh)

@@ -9,7 +9,7 @@ from ..errors import UserError
 from ..outputs import part_ids
 from ..outputs.connected_regions import pieces_of
 from ..outputs.overrides import by_hand, keep_by_hand
-from ..outputs.palette import MAX_COLOURS
+from ..outputs.palette import MAX_COLORS
 from ..scene.characters import group
 from ..scene.poses import polygon_ranges
 from ..workflow import segment_list
@@ -30,14 +30,14 @@ class WKS_SEGMENT_OT_split_segment(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
         part = segment_list.active_part(settings)
-        objects = segment_list.labelled(settings)
+        objects = segment_list.labeled(settings)
         if part is None:
             return {"CANCELLED"}
         name = settings.style().name_of(part)
         try:
             found = pieces_of(group(objects), part, settings.min_share / 100)
             count = 1 + max((int(pieces.max(initial=-1)) for pieces in found.values()), default=-1)
-            if count > MAX_COLOURS:
+            if count > MAX_COLORS:
                 raise UserError(f"{name} is in {count} pieces, too many for a list: raise Smallest Part (Advanced)")
         except UserError as error:
             _report.tell(self, {"ERROR"}, str(error))

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ..scene.characters import Character
-from ..scene.marked_edges import neighbours
+from ..scene.marked_edges import neighbors
 from ..scene.mesh_arrays import Body
 from ..scene.poses import polygon_ranges
 from .labels import labels_on
@@ -40,7 +40,7 @@ def _pieces(character: Character, part: int, least_share: float) -> IntArray:
     for obj, polygons in polygon_ranges(character):
         on_mesh = labels_on(obj.data)
         labels.append(np.full(polygons.stop - polygons.start, -1) if on_mesh is None else on_mesh)
-        pairs.append(polygons.start + neighbours(obj.data))
+        pairs.append(polygons.start + neighbors(obj.data))
         areas.append(values(obj.data.polygons, "area", np.float32))
     label, area = np.concatenate(labels), np.concatenate(areas).astype(np.float64)
     pair = np.concatenate(pairs)
@@ -59,8 +59,8 @@ def _pieces(character: Character, part: int, least_share: float) -> IntArray:
     number[large] = np.arange(len(large))
     piece = number[component.ravel()]
     if (piece < 0).any():
-        centre = Body.of(character).polygons[polygons_in]
-        piece[piece < 0] = piece[piece >= 0][cKDTree(centre[piece >= 0]).query(centre[piece < 0])[1]]
+        center = Body.of(character).polygons[polygons_in]
+        piece[piece < 0] = piece[piece >= 0][cKDTree(center[piece >= 0]).query(center[piece < 0])[1]]
     result[polygons_in] = piece
     return result
 

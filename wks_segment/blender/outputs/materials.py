@@ -93,7 +93,7 @@ def _material(part: int, style: Style, template: bpy.types.Material | None) -> b
 
 
 def recolor_material(material: bpy.types.Material, part: int, style: Style) -> None:
-    """Give a material the colour of a part, in solid view and where its shader has a colour of its own."""
+    """Give a material the color of a part, in solid view and where its shader has a color of its own."""
     color = (*linear(style.colors_of(np.array([part]))[0]).tolist(), 1.0)
     material.diffuse_color = color
     for socket in _color_sockets(material):

@@ -107,13 +107,13 @@ def moved(
     The weight of a part goes to what the nearest polygon of that part has become.
     """
     result: dict[int, FloatArray] = {}
-    vertices, centres = values(mesh.vertices, "co", np.float32, 3), values(mesh.polygons, "center", np.float32, 3)
+    vertices, centers = values(mesh.vertices, "co", np.float32, 3), values(mesh.polygons, "center", np.float32, 3)
     for part, of_part in weights.items():
         mine = np.flatnonzero(before == part)
         found = part_ids.among(after[mine]) or [part]
         nearest = np.full(len(vertices), found[0])
         if len(found) > 1:
-            nearest = after[mine[cKDTree(centres[mine]).query(vertices)[1]]]
+            nearest = after[mine[cKDTree(centers[mine]).query(vertices)[1]]]
         for new in found:
             result[new] = result.get(new, 0.0) + np.where(nearest == new, of_part, 0.0)
     return result

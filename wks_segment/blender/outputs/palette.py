@@ -1,4 +1,4 @@
-"""Colours for parts: clearly different, never black, and the same for a part whatever the number of segments."""
+"""Colors for parts: clearly different, never black, and the same for a part whatever the number of segments."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ import numpy as np
 from ...core.mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from .part_ids import segments_of, sides_of
 
-MAX_COLOURS = 64
+MAX_COLORS = 64
 STEPS = 24
 """Candidates along each of red, green and blue."""
 LIGHTNESS = (0.50, 0.86)
-"""Range of lightness in OKLab, 0 black to 1 white: shading must stay readable on every colour."""
+"""Range of lightness in OKLab, 0 black to 1 white: shading must stay readable on every color."""
 CHROMA = (0.085, 0.18)
-"""Range of the distance from grey in OKLab: grey is what an object without segments looks like, neon tires the eye."""
+"""Range of the distance from gray in OKLab: gray is what an object without segments looks like, neon tires the eye."""
 FIRST = (0.86, 0.34, 0.28)
-"""The colour to start from, a warm red."""
+"""The color to start from, a warm red."""
 LEFT, RIGHT = (0.70, 0.92), (0.44, 0.60)
 """The same range of lightness for parts on the left and on the right, which are told apart by it …"""
 SIDED_CHROMA = (0.06, 0.30)
 SIDED_HUE = radians(35)
-"""… and recognised by a hue that differs from that of their segment by this angle at most."""
+"""… and recognized by a hue that differs from that of their segment by this angle at most."""
 USUAL, RARE = 12, 1.7
-"""Colours of the palette behind so many are needed by few characters: they may be nearer by this factor."""
+"""Colors of the palette behind so many are needed by few characters: they may be nearer by this factor."""
 
 # Björn Ottosson, "A perceptual color space for image processing" (2020): linear sRGB to cone responses to OKLab.
 _TO_CONES = np.array(
@@ -57,7 +57,7 @@ _BY_ALL = np.concatenate([np.eye(3)[None], BLINDNESS])
 
 @dataclass(frozen=True)
 class Recipe:
-    """What the colours of a palette are chosen from, and by whom they are to be told apart."""
+    """What the colors of a palette are chosen from, and by whom they are to be told apart."""
 
     title: str
     description: str
@@ -69,7 +69,7 @@ class Recipe:
     color_blind: bool = False
 
     def seen(self, srgb: FloatArray) -> FloatArray:
-        """(k, …, 3) sRGB colours in OKLab, as each of those sees them who are to tell them apart."""
+        """(k, …, 3) sRGB colors in OKLab, as each of those sees them who are to tell them apart."""
         return np.stack([_lab_of_linear(linear(srgb) @ eye.T) for eye in _BY_ALL[: 4 if self.color_blind else 1]])
 
 
@@ -91,25 +91,25 @@ RECIPES = {
 
 @cache
 def palette(name: str = DEFAULT) -> FloatArray:
-    """(MAX_COLOURS, 3) sRGB colours, 0 to 1: each as far as possible, to the eye, from all before it."""
+    """(MAX_COLORS, 3) sRGB colors, 0 to 1: each as far as possible, to the eye, from all before it."""
     recipe = RECIPES[name]
     candidates, lab = _candidates()
     candidates = candidates[_within(lab, recipe.lightness, recipe.chroma)]
     seen = recipe.seen(candidates)
     chosen = [np.array(FIRST)]
     nearest = _distance(seen, recipe.seen(chosen[0]))
-    while len(chosen) < MAX_COLOURS:
+    while len(chosen) < MAX_COLORS:
         farthest = int(np.argmax(nearest))
         chosen.append(candidates[farthest])
         nearest = np.minimum(nearest, _distance(seen, seen[:, farthest]))
-    colours = np.stack(chosen)
-    colours.setflags(write=False)
-    return colours
+    colors = np.stack(chosen)
+    colors.setflags(write=False)
+    return colors
 
 
 @cache
 def sided_palette(name: str = DEFAULT) -> FloatArray:
-    """(3, MAX_COLOURS, 3) sRGB colours of the parts in the middle, which are those of the palette, left and right.
+    """(3, MAX_COLORS, 3) sRGB colors of the parts in the middle, which are those of the palette, left and right.
 
     Each as far as possible, to the eye, from all of the palette and from all sides before it.
     """
@@ -117,47 +117,47 @@ def sided_palette(name: str = DEFAULT) -> FloatArray:
     candidates, lab = _candidates()
     seen, middle = recipe.seen(candidates), recipe.seen(colors)
     hue = _hue(lab)
-    factor = np.where(np.arange(MAX_COLOURS) < USUAL, 1, RARE)
+    factor = np.where(np.arange(MAX_COLORS) < USUAL, 1, RARE)
     nearest = np.min([_distance(seen, middle[:, i]) * f for i, f in enumerate(factor)], axis=0)
-    colours = np.tile(colors, (3, 1, 1))
+    colors = np.tile(colors, (3, 1, 1))
     allowed = [_within(lab, lightness, SIDED_CHROMA) for lightness in (recipe.left, recipe.right)]
     for segment, own in enumerate(_hue(oklab(colors))):
         alike = np.cos(hue - own) >= np.cos(recipe.sided_hue)
         for side, within in enumerate(allowed, start=1):
             farthest = int(np.argmax(np.where(alike & within, nearest, -1)))
-            colours[side, segment] = candidates[farthest]
+            colors[side, segment] = candidates[farthest]
             nearest = np.minimum(nearest, _distance(seen, seen[:, farthest]))
-    colours.setflags(write=False)
-    return colours
+    colors.setflags(write=False)
+    return colors
 
 
 def _distance(seen: FloatArray, color: FloatArray) -> FloatArray:
-    """(n,) distance of (k, n, 3) colours, as k see them, from one, for those to whom it is smallest."""
+    """(n,) distance of (k, n, 3) colors, as k see them, from one, for those to whom it is smallest."""
     return np.asarray(np.linalg.norm(seen - color[:, None], axis=2).min(axis=0))
 
 
 def _candidates() -> tuple[FloatArray, FloatArray]:
-    """(STEPS³, 3) sRGB colours to choose from, and the same in OKLab."""
+    """(STEPS³, 3) sRGB colors to choose from, and the same in OKLab."""
     axis = np.linspace(0, 1, STEPS)
-    colours = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
-    return colours, oklab(colours)
+    colors = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
+    return colors, oklab(colors)
 
 
 def _within(lab: FloatArray, lightness: tuple[float, float], chroma: tuple[float, float]) -> BoolArray:
-    """(n,) whether (n, 3) colours in OKLab are within these ranges of lightness and of the distance from grey."""
-    grey = np.hypot(lab[:, 1], lab[:, 2])
+    """(n,) whether (n, 3) colors in OKLab are within these ranges of lightness and of the distance from gray."""
+    gray = np.hypot(lab[:, 1], lab[:, 2])
     light = lab[:, 0]
-    return (light >= lightness[0]) & (light <= lightness[1]) & (grey >= chroma[0]) & (grey <= chroma[1])
+    return (light >= lightness[0]) & (light <= lightness[1]) & (gray >= chroma[0]) & (gray <= chroma[1])
 
 
 def _hue(lab: FloatArray) -> FloatArray:
-    """(n,) angle of the hue of (n, 3) colours in OKLab."""
+    """(n,) angle of the hue of (n, 3) colors in OKLab."""
     return np.arctan2(lab[:, 2], lab[:, 1])
 
 
 def colors_of(parts: IntArray, name: str = DEFAULT) -> FloatArray:
-    """(…, 3) sRGB color of each part in a palette; they repeat after MAX_COLOURS segments."""
-    return sided_palette(name)[sides_of(parts), segments_of(parts) % MAX_COLOURS]
+    """(…, 3) sRGB color of each part in a palette; they repeat after MAX_COLORS segments."""
+    return sided_palette(name)[sides_of(parts), segments_of(parts) % MAX_COLORS]
 
 
 def most_different(used: FloatArray) -> FloatArray:
@@ -167,12 +167,12 @@ def most_different(used: FloatArray) -> FloatArray:
 
 
 def linear(srgb: FloatArray) -> FloatArray:
-    """(…, 3) sRGB colours in linear light, as materials take them."""
+    """(…, 3) sRGB colors in linear light, as materials take them."""
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
 
 
 def oklab(srgb: FloatArray) -> FloatArray:
-    """(…, 3) sRGB colours in OKLab, where a distance is what the eye sees."""
+    """(…, 3) sRGB colors in OKLab, where a distance is what the eye sees."""
     return _lab_of_linear(linear(srgb))
 
 

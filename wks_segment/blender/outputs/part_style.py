@@ -1,4 +1,4 @@
-"""What parts are called and how they are coloured: as the user has it, else by their number."""
+"""What parts are called and how they are colored: as the user has it, else by their number."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .palette import DEFAULT, colors_of
 
 @dataclass(frozen=True)
 class Style:
-    """Names and colours of parts.
+    """Names and colors of parts.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Style:
         return self.names.get(part) or part_ids.name_of(part)
 
     def colors_of(self, numbers: IntArray) -> FloatArray:
-        """(…, 3) sRGB colour of each part, given (…) numbers."""
+        """(…, 3) sRGB color of each part, given (…) numbers."""
         colors = colors_of(numbers, self.palette).copy()
         for part, color in self.colors.items():
             colors[np.asarray(numbers) == part] = color
@@ -49,4 +49,4 @@ class Style:
 
 
 PLAIN = Style()
-"""Nothing renamed, nothing recoloured."""
+"""Nothing renamed, nothing recolored."""

@@ -18,7 +18,7 @@ from bpy.props import (
 
 from ...core import PartNotes, PoseSegmentation
 from ..errors import UserError
-from ..outputs.palette import DEFAULT, MAX_COLOURS, RECIPES
+from ..outputs.palette import DEFAULT, MAX_COLORS, RECIPES
 from ..outputs.part_style import Style
 from ..workflow.live_session import session_of
 from ..workflow.model_library import followed
@@ -29,7 +29,7 @@ TUNED: dict[str, dict[str, Any]] = {
     "n_segments": {
         "name": "Segments",
         "description": "Number of kinds of parts. Parts that look alike, as both hands, are one kind",
-        "default": 8, "min": 2, "max": MAX_COLOURS, "soft_max": 20,
+        "default": 8, "min": 2, "max": MAX_COLORS, "soft_max": 20,
     },
     "auto_segments": {
         "name": "Automatic",
@@ -58,7 +58,7 @@ TUNED: dict[str, dict[str, Any]] = {
     },
     "min_share": {
         "name": "Smallest Part",
-        "description": "A connected part below this share of the surface joins its neighbour",
+        "description": "A connected part below this share of the surface joins its neighbor",
         "default": 0.5, "min": 0.0, "max": 20.0, "precision": 1, "subtype": "PERCENTAGE",
     },
 }  # fmt: skip
@@ -147,7 +147,7 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         name="Covariance",
         description="What shape the mixture gives to a kind of part",
         items=[
-            ("auto", "Automatic", "What generalises best to unseen poses"),
+            ("auto", "Automatic", "What generalizes best to unseen poses"),
             ("shared", "Shared", "One diagonal covariance for all segments, the most robust"),
             ("diag", "Diagonal", "A diagonal covariance for each segment"),
             ("spherical", "Spherical", "One variance for each segment"),
@@ -345,5 +345,5 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         self.part_notes = json.dumps(fields) if fields else ""
 
     def style(self) -> Style:
-        """Names and colours of parts as the user has them."""
+        """Names and colors of parts as the user has them."""
         return Style.of(self.notes(), self.palette)

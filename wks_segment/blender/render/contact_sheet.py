@@ -1,4 +1,4 @@
-"""A picture of poses side by side, each polygon in the colour of its segment."""
+"""A picture of poses side by side, each polygon in the color of its segment."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Tile:
 
 
 def render_poses(tiles: Sequence[Tile], path: Path, columns: int = COLUMNS, style: Style = PLAIN) -> None:
-    """Render poses into one PNG file, `columns` in a row, in the colours of a style.
+    """Render poses into one PNG file, `columns` in a row, in the colors of a style.
 
     Uses a scene of its own, which is gone afterwards.
 
@@ -99,7 +99,7 @@ def _add_pose(scene: bpy.types.Scene, points: FloatArray, tile: Tile, style: Sty
 
 
 def _triangle_colors(tile: Tile, style: Style) -> FloatArray:
-    """(m, 3) color of each triangle; grey where it is of no polygon of the character's own."""
+    """(m, 3) color of each triangle; gray where it is of no polygon of the character's own."""
     polygon_of = tile.pose.polygon_of
     return np.where(polygon_of[:, None] < 0, 0.6, style.colors_of(tile.labels[polygon_of]))
 
@@ -148,7 +148,7 @@ def _add_camera(scene: bpy.types.Scene, columns: int, rows: int) -> None:
 
 
 def render(scene: bpy.types.Scene, path: Path, width: int, height: int, light: str = "STUDIO") -> None:
-    """Render a scene to a PNG file, in the colours of its meshes; UserError if that fails or it cannot be written."""
+    """Render a scene to a PNG file, in the colors of its meshes; UserError if that fails or it cannot be written."""
     scene.render.engine = "BLENDER_WORKBENCH"
     scene.render.resolution_x, scene.render.resolution_y = width, height
     scene.render.resolution_percentage = 100

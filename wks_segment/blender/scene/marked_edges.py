@@ -17,11 +17,11 @@ from .poses import polygon_ranges
 
 SHARP, MATERIALS = "sharp", "materials"
 MOST_AROUND = 8
-"""Polygons at one edge that are all neighbours of each other, less one; of more, those that follow each other are."""
+"""Polygons at one edge that are all neighbors of each other, less one; of more, those that follow each other are."""
 
 
 def marked_pairs(character: Character, kinds: Collection[str]) -> IntArray | None:
-    """(q, 2) neighbouring polygons between which there is a mark of these kinds; None if there are no kinds.
+    """(q, 2) neighboring polygons between which there is a mark of these kinds; None if there are no kinds.
 
     The polygons of all objects are numbered one object after another, as in `Pose.polygon_of`.
     """
@@ -31,14 +31,14 @@ def marked_pairs(character: Character, kinds: Collection[str]) -> IntArray | Non
     return np.concatenate([polygons.start + _pairs_of_mesh(obj.data, kinds) for obj, polygons in ranges])
 
 
-def neighbours(mesh: bpy.types.Mesh) -> IntArray:
+def neighbors(mesh: bpy.types.Mesh) -> IntArray:
     """(q, 2) polygons of a mesh that share an edge, also across split vertices."""
-    return _neighbours(mesh, _welded_edges(mesh)[0])[0]
+    return _neighbors(mesh, _welded_edges(mesh)[0])[0]
 
 
 def _pairs_of_mesh(mesh: bpy.types.Mesh, kinds: Collection[str]) -> IntArray:
     edge, count = _welded_edges(mesh)
-    pairs, between = _neighbours(mesh, edge)
+    pairs, between = _neighbors(mesh, edge)
     chosen = np.zeros(len(pairs), dtype=bool)
     for kind in kinds:
         if kind == MATERIALS:
@@ -66,7 +66,7 @@ def _welded_edges(mesh: bpy.types.Mesh) -> tuple[IntArray, int]:
     return edge.ravel(), len(found)
 
 
-def _neighbours(mesh: bpy.types.Mesh, edge: IntArray) -> tuple[IntArray, IntArray]:
+def _neighbors(mesh: bpy.types.Mesh, edge: IntArray) -> tuple[IntArray, IntArray]:
     """(q, 2) polygons that share an edge, given the number of each edge of the mesh, and (q,) the edge."""
     polygon = np.repeat(np.arange(len(mesh.polygons)), _read(mesh.polygons, "loop_total", np.int32))
     edge = edge[_read(mesh.loops, "edge_index", np.int32)]

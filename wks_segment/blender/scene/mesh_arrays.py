@@ -1,4 +1,4 @@
-"""A character's own meshes in arrays: what labelling needs of them, read in one go so that it needs no Blender."""
+"""A character's own meshes in arrays: what labeling needs of them, read in one go so that it needs no Blender."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from .poses import polygon_ranges, vertex_ranges
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """The meshes of all objects of a character as modelled; they are numbered one object after another.
+    """The meshes of all objects of a character as modeled; they are numbered one object after another.
 
     Attributes
     ----------
     vertices : (n, 3) array
         In world space.
     polygons : (p, 3) array
-        Their centres.
+        Their centers.
     corners : tuple of two (c,) int arrays
         Vertex and polygon of each corner.
     marked : (q, 2) int array or None
-        Neighbouring polygons between which a border is welcome; see `marked_pairs`.
+        Neighboring polygons between which a border is welcome; see `marked_pairs`.
     """
 
     vertices: FloatArray

@@ -54,7 +54,7 @@ GERMAN_MESSAGES = {
     "Split": "Zerlegen",
     # Jobs.
     "Starting": "Beginnt",
-    "Cancelling": "Wird abgebrochen",
+    "Canceling": "Wird abgebrochen",
     "Done, to be written in Object Mode": "Fertig, wird im Objekt-Modus geschrieben",
     'Seams of "…"': 'Nähte von "{1!}"',
     "Signature of …": "Signatur von {1!}",
@@ -69,7 +69,7 @@ GERMAN_MESSAGES = {
     "a few seconds left": "noch einige Sekunden",
     "about … s left": "noch etwa {1} s",
     "about … min left": "noch etwa {1} min",
-    "… was cancelled, nothing is written": "{1!}: abgebrochen, nichts ist geschrieben",
+    "… was canceled, nothing is written": "{1!}: abgebrochen, nichts ist geschrieben",
     "… was ended, nothing is written: …": "{1!}: beendet, nichts ist geschrieben: {2!}",
     "the extension was disabled": "die Erweiterung wurde deaktiviert",
     "another file was opened": "eine andere Datei wurde geöffnet",
@@ -94,7 +94,7 @@ GERMAN_MESSAGES = {
     "… is the only one there is to compare with": "{1} ist das einzige, mit dem verglichen werden kann",
     "Left out: …": "Ausgelassen: {1!}",
     'The model "…" was left out: …': 'Das Modell "{1}" wurde ausgelassen: {2!}',
-    # Grey buttons, and what is missing.
+    # Gray buttons, and what is missing.
     "A job is running: wait or cancel it": "Es läuft eine Arbeit: warten oder sie abbrechen",
     "No job is running": "Es läuft keine Arbeit",
     "Switch to Object Mode first": "Erst in den Objekt-Modus wechseln",
@@ -163,7 +163,7 @@ GERMAN_MESSAGES = {
     "every face of the mesh collapses when vertices at the same position are joined": "jede Fläche des Meshs fällt zusammen, wenn Vertices an derselben Stelle vereint werden",
     "the mesh has only … vertices, and so many eigenpairs": "das Mesh hat nur {1} Vertices und so viele Eigenpaare",
     '"…" has … faces, too few for … segments: take fewer segments, or subdivide it': '"{1}" hat {2} Flächen, zu wenige für {3} Segmente: weniger Segmente nehmen oder es unterteilen',
-    # Learning and labelling.
+    # Learning and labeling.
     "The number of segments cannot be automatic with the method of the paper: give a number, or take the robust method": "Mit der Methode des Artikels kann die Anzahl der Segmente nicht automatisch sein: eine Anzahl angeben oder die robuste Methode nehmen",
     "The segments could not be learned: …": "Die Segmente konnten nicht gelernt werden: {1!}",
     "n_segments is …, but the poses have only … vertices": "{1} Segmente sind gewünscht, aber die Posen haben nur {2} Vertices",
@@ -177,14 +177,14 @@ GERMAN_MESSAGES = {
     # The eigensolver.
     "… eigenpairs of … vertices (…) need about … MB of memory, and … MB are free: close other programs, or take fewer pairs or a coarser mesh": "{1} Eigenpaare von {2} Vertices ({3}) brauchen etwa {4} MB Speicher, und {5} MB sind frei: andere Programme schließen, weniger Paare oder ein gröberes Mesh nehmen",
     "… of … eigenpairs were not found": "{1} von {2} Eigenpaaren wurden nicht gefunden",
-    "the operator cannot be factorised, its triangles are too thin: …": "der Operator lässt sich nicht faktorisieren, seine Dreiecke sind zu dünn: {1!}",
+    "the operator cannot be factorized, its triangles are too thin: …": "der Operator lässt sich nicht faktorisieren, seine Dreiecke sind zu dünn: {1!}",
     "a front of … unknowns has no inverse": "eine Front aus {1} Unbekannten hat keine Inverse",
     "the eigenpairs are not accurate enough: relative residual …, departure from orthonormality …, allowed …": "die Eigenpaare sind nicht genau genug: relatives Residuum {1}, Abweichung von der Orthonormalität {2}, erlaubt {3}",
     "the dense eigensolver failed (…)": "der dichte Eigenlöser ist gescheitert ({1})",
     "the matrix has entries that are not finite": "die Matrix hat Einträge, die nicht endlich sind",
     "the coarse space has entries that are not finite": "der grobe Raum hat Einträge, die nicht endlich sind",
     "the fast eigensolver did not converge on this mesh; used the exact one": "der schnelle Eigenlöser ist auf diesem Mesh nicht konvergiert; der genaue wurde genommen",
-    "eigenfunctions … to … of this very large mesh may be off by some per cent: compare with a decimated copy, or use the exact solver": "Eigenfunktionen {1} bis {2} dieses sehr großen Meshs können um einige Prozent abweichen: mit einer dezimierten Kopie vergleichen oder den genauen Löser nehmen",
+    "eigenfunctions … to … of this very large mesh may be off by some percent: compare with a decimated copy, or use the exact solver": "Eigenfunktionen {1} bis {2} dieses sehr großen Meshs können um einige Prozent abweichen: mit einer dezimierten Kopie vergleichen oder den genauen Löser nehmen",
     "the signature needs an eigenvalue above zero": "die Signatur braucht einen Eigenwert über null",
     "the signature needs two eigenvalues above zero, of … there are …": "die Signatur braucht zwei Eigenwerte über null, von {1} gibt es {2}",
     "the eigenvalues … to … span no energies: take more pairs": "die Eigenwerte {1} bis {2} spannen keine Energien auf: mehr Paare nehmen",

@@ -37,7 +37,7 @@ class _Sidebar:
         return settings
 
     def segments(self, context: bpy.types.Context) -> None:
-        """Show the number of segments, grey where it is found."""
+        """Show the number of segments, gray where it is found."""
         settings = context.scene.wks_segment
         column = self.layout.column()
         number = column.column()

@@ -27,7 +27,7 @@ LIGHT = np.array([0.3, -0.5, 0.8])
 def picture(
     context: bpy.types.Context, labels: Mapping[Character, IntArray], style: Style = PLAIN
 ) -> tuple[FloatArray, FloatArray]:
-    """(3 t, 3) corners of the triangles of characters as they are seen now, a little above them, and (3 t, 4) colours.
+    """(3 t, 3) corners of the triangles of characters as they are seen now, a little above them, and (3 t, 4) colors.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def picture(
     labels
         Part of each of a character's polygons.
     style : Style, optional
-        Colours of parts.
+        Colors of parts.
     """
     places, colors = [np.zeros((0, 3))], [np.zeros((0, 4))]
     for character, parts in labels.items():

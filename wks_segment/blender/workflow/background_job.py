@@ -31,7 +31,7 @@ HOLDER = "wks_segment_desk"
 BUSY = "A job is running: wait or cancel it"
 
 
-class Cancelled(Exception):  # noqa: N818  # no error, but the way out of the thread
+class Canceled(Exception):  # noqa: N818  # no error, but the way out of the thread
     """Raised by the progress of a job that is to end."""
 
 
@@ -130,13 +130,13 @@ class Job:
         """How it was ended."""
         if self._reason:
             return f"{self.name} was ended, nothing is written: {self._reason}"
-        return f"{self.name} was cancelled, nothing is written"
+        return f"{self.name} was canceled, nothing is written"
 
     @property
     def lines(self) -> tuple[str, str]:
         """What it is at, and how far, for the panel: "Signature of Fox, frame 12 · 3 of 5" and "about 20 s left"."""
         if self.ending:
-            return in_panel("Cancelling"), in_panel(self._reason)
+            return in_panel("Canceling"), in_panel(self._reason)
         stage = re.sub(r" \((\d+ \w+ \d+)\)$", r" · \1", in_panel(self.stage).replace('"', ""))
         return stage, in_panel(str(self._left)) or f"{100 * self.share:.0f} %"
 
@@ -144,7 +144,7 @@ class Job:
         """Called in the thread."""
         self.stage, self.share = stage, share
         if self._ending.is_set():
-            raise Cancelled
+            raise Canceled
 
     def _run(self) -> None:
         try:

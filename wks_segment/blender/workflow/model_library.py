@@ -1,6 +1,6 @@
 """The models of a scene: one in use, others kept beside it, and those of the model folder.
 
-What is in use lies in the settings themselves (`model`, `model_summary`, `part_notes`): there labels, names and colours
+What is in use lies in the settings themselves (`model`, `model_summary`, `part_notes`): there labels, names and colors
 are read and written. The row of another one holds the same three until it is used. A row is used by being active.
 """
 
@@ -80,7 +80,7 @@ def add(settings: WKSSegmentSettings, model: PoseSegmentation, name: str, summar
 
 
 def use(settings: WKSSegmentSettings, index: int) -> None:
-    """Use the model of a row, with its names and colours. Labels on meshes stay until it is applied."""
+    """Use the model of a row, with its names and colors. Labels on meshes stay until it is applied."""
     adopt(settings)
     if index == settings.used_model or not 0 <= index < len(settings.models):
         return
@@ -97,7 +97,7 @@ def followed(settings: WKSSegmentSettings, context: bpy.types.Context) -> None:
 
 
 def duplicate(settings: WKSSegmentSettings) -> None:
-    """Copy the model in use, with its names and colours, and use the copy; UserError if there is none."""
+    """Copy the model in use, with its names and colors, and use the copy; UserError if there is none."""
     row = _used(settings)
     _add_row(settings, row.name, row.n_segments, row.date)
 
@@ -105,7 +105,7 @@ def duplicate(settings: WKSSegmentSettings) -> None:
 def remove(settings: WKSSegmentSettings) -> None:
     """Remove the model in use, and use the one next to it; UserError if there is none.
 
-    With the last one the names and colours stay: labels on meshes have them.
+    With the last one the names and colors stay: labels on meshes have them.
     """
     _used(settings)
     index = settings.used_model

@@ -60,7 +60,7 @@ class Wanted:
         Name of the material that those of parts are copies of; empty: none.
     style : Style
     bodies
-        Of the characters that are labelled.
+        Of the characters that are labeled.
     """
 
     min_share: float
@@ -136,7 +136,7 @@ def describe(
     model: PoseSegmentation, poses: Sequence[Pose], report: Report, progress: Progress, share: float = 1.0,
     cache: SignatureCache | None = None, workers: int | None = None,
 ) -> list[Workpiece]:  # fmt: skip
-    """Signature of each pose, to be labelled; poses that are one and the same surface are computed once.
+    """Signature of each pose, to be labeled; poses that are one and the same surface are computed once.
 
     What is in the cache is not computed at all.
     """

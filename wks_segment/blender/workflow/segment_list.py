@@ -31,7 +31,7 @@ SAME = 0.5
 """Share of two parts' common area above which one of a new model is the other of the old one. Only one can be."""
 
 
-def labelled(settings: WKSSegmentSettings, everywhere: bool = False) -> list[bpy.types.Object]:
+def labeled(settings: WKSSegmentSettings, everywhere: bool = False) -> list[bpy.types.Object]:
     """Objects of the scene with labels: those in Edit Mode, or the selected ones, or all if there are none of either.
 
     All, too, if all are asked for.
@@ -52,12 +52,12 @@ def meshes_of(objects: list[bpy.types.Object]) -> list[bpy.types.Mesh]:
 
 
 def fill(settings: WKSSegmentSettings) -> None:
-    """List the segments that the labelled objects have now, with their shares of the area; the active one stays."""
+    """List the segments that the labeled objects have now, with their shares of the area; the active one stays."""
     active = active_part(settings)
     area: dict[int, float] = {}
     seen: dict[int, bool] = {}
     settings.faces_by_hand = 0
-    for obj in labelled(settings):
+    for obj in labeled(settings):
         labels = labels_on(obj.data)
         if labels is None:
             continue
@@ -96,7 +96,7 @@ def activate(settings: WKSSegmentSettings, part: int) -> None:
 def rewrite_all(settings: WKSSegmentSettings, objects: list[bpy.types.Object] | None = None) -> None:
     """Write the labels of objects (None: of all in the scene) anew with the edits of now, and list them."""
     notes = settings.notes()
-    for mesh in meshes_of(labelled(settings, everywhere=True) if objects is None else objects):
+    for mesh in meshes_of(labeled(settings, everywhere=True) if objects is None else objects):
         rewrite(mesh, settings.style(), notes.joined)
     fill(settings)
 
@@ -126,16 +126,16 @@ def rename(settings: WKSSegmentSettings, part: int, name: str) -> None:
 
 
 def recolor(settings: WKSSegmentSettings, part: int, color: tuple[float, float, float]) -> None:
-    """Give a part a colour, everywhere."""
+    """Give a part a color, everywhere."""
     notes = settings.notes()
     settings.keep_notes(replace(notes, colors={**notes.colors, part: color}))
     restyle(settings, part, name=False)
 
 
 def restyle(settings: WKSSegmentSettings, part: int, name: bool = True, color: bool = True) -> None:
-    """Let the name or the colour of a part, where it is written, be that of now."""
+    """Let the name or the color of a part, where it is written, be that of now."""
     style = settings.style()
-    meshes = meshes_of(labelled(settings, everywhere=True))
+    meshes = meshes_of(labeled(settings, everywhere=True))
     for mesh in meshes if name else ():
         rename_group(mesh, mesh[NOTE], part, style)
     with object_mode(bpy.context) if color else nullcontext():
@@ -150,10 +150,10 @@ def restyle(settings: WKSSegmentSettings, part: int, name: bool = True, color: b
 
 
 def make_part(settings: WKSSegmentSettings, name: str, side: int = 0) -> int:
-    """A new part of that name (or one with a number), in a colour that is far from all others; gives its number."""
+    """A new part of that name (or one with a number), in a color that is far from all others; gives its number."""
     notes, style = settings.notes(), settings.style()
     taken = {item.number for item in settings.segments} | notes.names.keys() | notes.joined.keys()
-    for mesh in meshes_of(labelled(settings, everywhere=True)):
+    for mesh in meshes_of(labeled(settings, everywhere=True)):
         taken |= set(np.unique(by_hand(mesh)).tolist())
     taken.discard(-1)
     part = part_ids.new_part(taken, side)
@@ -166,13 +166,13 @@ def make_part(settings: WKSSegmentSettings, name: str, side: int = 0) -> int:
 
 
 def carry_over(settings: WKSSegmentSettings, labels: Mapping[Character, IntArray]) -> None:
-    """Let names, colours and what is by hand follow the parts from an old model's numbers to those of a new one.
+    """Let names, colors and what is by hand follow the parts from an old model's numbers to those of a new one.
 
     To be called with the new labels, before they are written. A part is another one's successor if it covers more than
     half of what the two cover. What was given by hand to a part without a successor is a part of its own from then on.
     """
     notes, style = settings.notes(), settings.style()
-    given = {mesh: by_hand(mesh) for mesh in meshes_of(labelled(settings, everywhere=True))}
+    given = {mesh: by_hand(mesh) for mesh in meshes_of(labeled(settings, everywhere=True))}
     present = {part for found in given.values() for part in np.unique(found[found >= 0]).tolist()}
     new = _successors(labels) | {part: part for part in present if part % part_ids.SIDE >= part_ids.MADE}
     settings.keep_notes(
@@ -238,7 +238,7 @@ def _suffixed(base: str, part: int, number: str = "") -> str:
 
 
 def _recolor_faces(mesh: bpy.types.Mesh, part: int, style: Style) -> None:
-    """Give the corners of a part's faces its colour, where colours were written."""
+    """Give the corners of a part's faces its color, where colors were written."""
     labels, colors = labels_on(mesh), mesh.color_attributes.get(note_of(mesh).get("colors", ""))
     if labels is None or colors is None:
         return

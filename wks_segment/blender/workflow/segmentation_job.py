@@ -25,9 +25,9 @@ from .pipeline import Wanted
 from .report import Report, segment_warnings
 
 LEARNED, DESCRIBED = 0.9, 0.6
-"""Share of the work that is done when labelling begins: in learning, and in applying."""
-LABELLED = 0.7
-"""Share of the rest that is labelling, not soft weights."""
+"""Share of the work that is done when labeling begins: in learning, and in applying."""
+LABELED = 0.7
+"""Share of the rest that is labeling, not soft weights."""
 
 
 @dataclass
@@ -139,18 +139,18 @@ class Work:
         def describing(stage: str, share: float) -> None:
             progress(stage, begun * share)
 
-        def labelling(stage: str, share: float) -> None:
-            progress(stage, begun + (1 - begun) * LABELLED * share)
+        def labeling(stage: str, share: float) -> None:
+            progress(stage, begun + (1 - begun) * LABELED * share)
 
         def softening(stage: str, share: float) -> None:
-            progress(stage, begun + (1 - begun) * (LABELLED + (1 - LABELLED) * share))
+            progress(stage, begun + (1 - begun) * (LABELED + (1 - LABELED) * share))
 
         model, poses, wanted, report = self.model, self.poses, self.wanted, self.report
         if not self.described and self.learns:
             self.described = pipeline.learn(model, poses, report, describing, self.cache)
         elif not self.described:
             self.described = pipeline.describe(model, poses, report, describing, cache=self.cache)
-        self.labels = pipeline.label(model, poses, self.described, wanted, report, labelling)
+        self.labels = pipeline.label(model, poses, self.described, wanted, report, labeling)
         self._soft = pipeline.soften(model, poses, self.described, self.labels, wanted, report, softening)
         if self.learns:
             report.warnings += segment_warnings(model, report)

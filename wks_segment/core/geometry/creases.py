@@ -48,7 +48,7 @@ FLAT = 0.003
 def outward(faces: IntArray, corners: FloatArray) -> FloatArray:
     """(m,) +1 for each face whose (3, 3) corners turn counter-clockwise seen from outside, −1 for others.
 
-    Neighbours are made to agree, then the larger side of each loose part is taken for the inside.
+    Neighbors are made to agree, then the larger side of each loose part is taken for the inside.
     """
     m = len(faces)
     rising = (faces < np.roll(faces, -1, axis=1)).ravel()
@@ -58,7 +58,7 @@ def outward(faces: IntArray, corners: FloatArray) -> FloatArray:
     first, second = order[same], order[same + 1]
     a, b = first // 3, second // 3
     turned = rising[first] == rising[second]
-    # Each face has two sides; sides of neighbours that look the same way hang together.
+    # Each face has two sides; sides of neighbors that look the same way hang together.
     rows, columns = np.concatenate([a, a + m]), np.concatenate([np.where(turned, b + m, b), np.where(turned, b, b + m)])
     graph = coo_matrix((np.ones(2 * len(a), dtype=np.int8), (rows, columns)), shape=(2 * m,) * 2)
     side = connected_components(graph, directed=False)[1]
@@ -86,12 +86,12 @@ def smooth_normals(normals: FloatArray, flow: HeatFlow) -> FloatArray:
 
 
 def curvature_across(surface: Surface, normals: FloatArray, adjacency: FaceAdjacency) -> FloatArray:
-    """(p,) curvature of a surface of area 1 from one face to its neighbour: negative in a crease, 3.5 on a sphere."""
+    """(p,) curvature of a surface of area 1 from one face to its neighbor: negative in a crease, 3.5 on a sphere."""
     original = surface.original
     of_faces = _unit(surface.to_faces(normals))
-    centres = original.vertices[original.faces].mean(axis=1) / np.sqrt(original.area)
+    centers = original.vertices[original.faces].mean(axis=1) / np.sqrt(original.area)
     a, b = adjacency.pairs.T
-    step = centres[b] - centres[a]
+    step = centers[b] - centers[a]
     squared = np.maximum(np.einsum("ij,ij->i", step, step), FLAT**2)
     return np.asarray(np.einsum("ij,ij->i", of_faces[b] - of_faces[a], step) / squared)
 
@@ -137,7 +137,7 @@ def log_thickness(
 def border_weights(
     surface: Surface, adjacency: FaceAdjacency, tick: Callable[[float], None] | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """(p,) weight of the border between neighbours, 1 where nothing speaks for a cut, and the fine curvature there.
+    """(p,) weight of the border between neighbors, 1 where nothing speaks for a cut, and the fine curvature there.
 
     `tick` is called with the share that is done.
     """
@@ -146,9 +146,9 @@ def border_weights(
     fine, coarse = (smooth_normals(normals, flows.over(length)) for length in (FINE, COARSE))
     thickness = surface.to_faces(log_thickness(surface, fine, flows, tick)[:, None])[:, 0]
     curvature = curvature_across(surface, coarse, adjacency)
-    centres = original.vertices[original.faces].mean(axis=1) / np.sqrt(original.area)
+    centers = original.vertices[original.faces].mean(axis=1) / np.sqrt(original.area)
     a, b = adjacency.pairs.T
-    distances = np.maximum(np.linalg.norm(centres[a] - centres[b], axis=1), SHORTEST)
+    distances = np.maximum(np.linalg.norm(centers[a] - centers[b], axis=1), SHORTEST)
     step = np.minimum(np.abs(thickness[a] - thickness[b]) / distances, MOST_STEP)
     weights = np.exp(CREASE * np.clip(curvature, -MOST_CONCAVE, MOST_CONVEX) - STEP * step)
     return weights, curvature_across(surface, fine, adjacency)
@@ -167,8 +167,8 @@ def _touching(
     touch = p + flat[:, None] * (m - n)
     near = (facing < 0) & (flat > 0) & (np.einsum("ij,ij->i", touch - q, touch - q) < spacing**2)
     radius = np.where(near, np.minimum(flat, radius), radius)
-    centre = p - radius[:, None] * n
-    cosine = np.einsum("ij,ij->i", _unit(p - centre), _unit(np.where(near[:, None], touch, q) - centre))
+    center = p - radius[:, None] * n
+    cosine = np.einsum("ij,ij->i", _unit(p - center), _unit(np.where(near[:, None], touch, q) - center))
     return radius, np.asarray(cosine > NOISE)
 
 

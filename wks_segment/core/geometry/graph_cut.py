@@ -2,7 +2,7 @@
 
 The energy of Boykov, Veksler and Zabih, "Fast approximate energy minimization via graph cuts" (2001): what a label
 costs on a face, by its posterior, and what a border costs, by its length, less where people cut (concave creases, the
-minima rule of Hoffman and Richards 1984) and where the artist has marked edges. Minimised by their alpha expansion.
+minima rule of Hoffman and Richards 1984) and where the artist has marked edges. Minimized by their alpha expansion.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ LARGEST = 2.0**29
 TINY = 1e-200
 """What costs less than this costs nothing."""
 SHORTEST = 1e-12
-"""Distance between the centres of faces from which on they count as that far apart."""
+"""Distance between the centers of faces from which on they count as that far apart."""
 SWEEPS = 5
 """Rounds over all labels at most. Two or three are usual."""
 
 
 def crease_weights(surface: Surface, adjacency: FaceAdjacency, crease: float = CREASE) -> FloatArray:
-    """(p,) weight of the border between neighbours among the original faces: 1 where flat or convex, less in creases.
+    """(p,) weight of the border between neighbors among the original faces: 1 where flat or convex, less in creases.
 
     For `cut_borders`; where marked edges are to attract borders, to be multiplied by a number below 1 there.
     """
@@ -49,7 +49,7 @@ def crease_weights(surface: Surface, adjacency: FaceAdjacency, crease: float = C
 
 
 def coarse_curvature(surface: Surface, adjacency: FaceAdjacency, flows: Flows) -> FloatArray:
-    """(p,) curvature of a surface of area 1 from one original face to its neighbour, but for what is small."""
+    """(p,) curvature of a surface of area 1 from one original face to its neighbor, but for what is small."""
     return curvature_across(surface, smooth_normals(vertex_normals(surface), flows.over(COARSE)), adjacency)
 
 
@@ -61,7 +61,7 @@ def weights_of_curvature(curvature: FloatArray, crease: float = CREASE) -> Float
 def cut_borders(
     posteriors: FloatArray,
     areas: FloatArray,
-    centres: FloatArray,
+    centers: FloatArray,
     adjacency: FaceAdjacency,
     weights: FloatArray,
     length: float,
@@ -79,7 +79,7 @@ def cut_borders(
     posteriors : (m, K) array
         Of the labels, on each face; smoothed over `length`.
     areas : (m,) array
-    centres : (m, 3) array
+    centers : (m, 3) array
         In the unit whose square is that of the areas.
     adjacency : FaceAdjacency
         Its lengths in the same unit. Pairs may repeat, as of polygons that share several edges.
@@ -92,7 +92,7 @@ def cut_borders(
     strength : float
         What a border costs, in units of `length`. 0 changes nothing if `labels` is not given.
     width : float
-        How far labels may spread, in units of `length`. The centre of a face counts, so nothing changes on a mesh that
+        How far labels may spread, in units of `length`. The center of a face counts, so nothing changes on a mesh that
         is coarser than that.
 
     Returns
@@ -108,7 +108,7 @@ def cut_borders(
         raise ValueError("a weight of a border must not be negative")
     labels = np.asarray(posteriors.argmax(axis=1) if labels is None else labels)
     unit = np.sqrt(areas.sum())
-    within = _labels_within(labels, posteriors.shape[1], centres, adjacency, width * length * unit)
+    within = _labels_within(labels, posteriors.shape[1], centers, adjacency, width * length * unit)
     band = np.flatnonzero(within.any(axis=1))
     if not len(band):
         return labels.copy()
@@ -123,20 +123,20 @@ def cut_borders(
     borders = strength * length / unit * weights[beside] * adjacency.lengths[beside]
     energy = Energy.of(data, number[pairs], borders)
     cut = labels.copy()
-    cut[some] = minimised(energy, labels[some], within[some])
+    cut[some] = minimized(energy, labels[some], within[some])
     return cut
 
 
 @dataclass(frozen=True)
 class Energy:
-    """What labels cost: a sum over nodes and over pairs of neighbours with different labels, in whole numbers.
+    """What labels cost: a sum over nodes and over pairs of neighbors with different labels, in whole numbers.
 
     Attributes
     ----------
     data : (n, K) int array
         What each label costs at each node, not negative.
     pairs : (p, 2) int array
-        Neighbours.
+        Neighbors.
     borders : (p,) int array
         What it costs if they differ.
     """
@@ -161,7 +161,7 @@ class Energy:
         return int(self.data[np.arange(len(labels)), labels].sum() + self.borders[differ].sum())
 
 
-def minimised(energy: Energy, labels: IntArray, allowed: BoolArray) -> IntArray:
+def minimized(energy: Energy, labels: IntArray, allowed: BoolArray) -> IntArray:
     """(n,) labels whose energy no expansion of one label lowers, if rounds suffice, and is not above that at first.
 
     Parameters
@@ -249,11 +249,11 @@ def _sums(owner: IntArray, values: IntArray, count: int) -> IntArray:
 
 
 def _labels_within(
-    labels: IntArray, count: int, centres: FloatArray, adjacency: FaceAdjacency, distance: float
+    labels: IntArray, count: int, centers: FloatArray, adjacency: FaceAdjacency, distance: float
 ) -> BoolArray:
     """(m, count) whether a face has another label than this one, but is no further than a distance from a face of it.
 
-    By ways over the surface, from centre to centre.
+    By ways over the surface, from center to center.
     """
     m = len(labels)
     within = np.zeros((m, count), dtype=bool)
@@ -261,7 +261,7 @@ def _labels_within(
     border = np.unique(pairs[labels[pairs[:, 0]] != labels[pairs[:, 1]]])
     if not len(border):
         return within
-    ways = _ways(pairs, np.linalg.norm(centres[pairs[:, 0]] - centres[pairs[:, 1]], axis=1), m)
+    ways = _ways(pairs, np.linalg.norm(centers[pairs[:, 0]] - centers[pairs[:, 1]], axis=1), m)
     near = np.flatnonzero(_distances(ways, border, distance) <= distance)
     number, ways = _numbered(near, m), ways[near][:, near]
     for label in np.unique(labels[border]):

@@ -35,7 +35,7 @@ def parts(surface: Surface, adjacency: FaceAdjacency, borders: FloatArray, curva
     adjacency : FaceAdjacency
         Of these.
     borders : (p,) array
-        Weighted length of the border between neighbours, for a surface of area 1.
+        Weighted length of the border between neighbors, for a surface of area 1.
     curvature : (p,) array
         Across it, negative in a crease.
 
@@ -58,7 +58,7 @@ def normalized_cut(patch: IntArray, areas: FloatArray, pairs: IntArray, borders:
     areas : (m,) array
         Of the faces; they sum to 1.
     pairs : (p, 2) int array
-        Neighbouring faces.
+        Neighboring faces.
     borders : (p,) array
         Weighted length of the border between them.
     gain : float
@@ -87,7 +87,7 @@ def normalized_cut(patch: IntArray, areas: FloatArray, pairs: IntArray, borders:
 
 
 def _grown_together(cut: FloatArray, touch: BoolArray, area: FloatArray, gain: float) -> IntArray:
-    """(r,) the patch that each of r patches belongs to in the end, given weighted borders, neighbours and areas."""
+    """(r,) the patch that each of r patches belongs to in the end, given weighted borders, neighbors and areas."""
     count = len(area)
     area, border = area.copy(), cut.sum(axis=1)
     gained = np.where(touch, gains_of_joining(cut, border, area), -np.inf)
@@ -126,16 +126,16 @@ def _patches(surface: Surface, adjacency: FaceAdjacency, curvature: FloatArray) 
     """(m,) patch of each face: that of the seed which is nearest, ways across creases being longer."""
     original = surface.original
     m = original.n_faces
-    centres = original.vertices[original.faces].mean(axis=1)
+    centers = original.vertices[original.faces].mean(axis=1)
     a, b = adjacency.pairs.T
-    steps = np.linalg.norm(centres[a] - centres[b], axis=1) / np.sqrt(original.area)
+    steps = np.linalg.norm(centers[a] - centers[b], axis=1) / np.sqrt(original.area)
     ways = steps * (1 + PATCH_CREASE * np.clip(-curvature, 0, MOST_CONCAVE)) + 1e-9
     graph = coo_matrix((np.append(ways, ways), (np.append(a, b), np.append(b, a))), shape=(m, m)).tocsr()
     # Seeds as far from each other as can be, and one in each loose part.
     seeds = [int(original.face_areas.argmax())]
     distance = np.full(m, np.inf)
     for _ in range(min(PATCHES, m) - 1):
-        offset = centres - centres[seeds[-1]]
+        offset = centers - centers[seeds[-1]]
         np.minimum(distance, np.einsum("ij,ij->i", offset, offset), out=distance)
         seeds.append(int(distance.argmax()))
     of_parts = np.unique(connected_components(graph, directed=False)[1], return_index=True)[1]

@@ -35,7 +35,7 @@ MOST_NUMBERS = 3_000_000
 
 
 @dataclass(frozen=True)
-class Labeller:
+class Labeler:
     """A learned mixture, how its components make segments, and how smooth these are to be.
 
     Attributes
@@ -44,7 +44,7 @@ class Labeller:
         With K components.
     grouping : Grouping or None
         None: each component is a segment.
-    standardised
+    standardized
         From the signature of a pose to what entered the mixture.
     n_segments : int
     length : float
@@ -53,13 +53,13 @@ class Labeller:
 
     mixture: GaussianMixture
     grouping: Grouping | None
-    standardised: Callable[[FloatArray], FloatArray]
+    standardized: Callable[[FloatArray], FloatArray]
     n_segments: int
     length: float
 
     def posteriors(self, work: Workpiece) -> FloatArray:
         """(n', K) posteriors of the components at the vertices of a pose."""
-        return self.mixture.posteriors(self.standardised(work.pose.signature))
+        return self.mixture.posteriors(self.standardized(work.pose.signature))
 
     def joined(self, posteriors: FloatArray, n_groups: int | None = None) -> FloatArray:
         """(…, n_groups) sums of (…, K) posteriors over each group's components; over each segment's if not given."""
@@ -117,7 +117,7 @@ class Labeller:
             how = {"least_of_largest": STRAY if least_share > 0 else 0.0}
         else:
             how = {"crease": REGION_CREASE, "width": REGION_WIDTH}
-        return posed.labelled(works, posteriors, self.length, least_share, marked, **how)
+        return posed.labeled(works, posteriors, self.length, least_share, marked, **how)
 
     @threadpool_limits.wrap(limits=1, user_api="blas")  # as above
     def named_regions(self, atlas: RegionAtlas, work: Workpiece, least_share: float) -> IntArray:
@@ -149,8 +149,8 @@ class Labeller:
             for i, work in enumerate(alike):
                 tick((begun + CLEANED * len(alike) + (1 - CLEANED) * i) / len(works))
                 traits.append(self._traits(regions, work, len(alike)))
-        centres = found[0].centres(first if rest is None else rest)
-        return RegionAtlas.learned(n_groups, traits, centres, alike=len(found) == 1)
+        centers = found[0].centers(first if rest is None else rest)
+        return RegionAtlas.learned(n_groups, traits, centers, alike=len(found) == 1)
 
     @threadpool_limits.wrap(limits=1, user_api="blas")  # as above
     def sides(
@@ -201,8 +201,8 @@ class Labeller:
         """Connected regions of so many groups on a mesh, agreed on by poses of it."""
 
         def found() -> Regions:
-            labels, neighbours = self.clean(works, None, least_share, progress, n_groups=n_groups)
-            return Regions.of(labels, neighbours, works[0].surface.original)
+            labels, neighbors = self.clean(works, None, least_share, progress, n_groups=n_groups)
+            return Regions.of(labels, neighbors, works[0].surface.original)
 
         poses = (work.pose for work in works)
         made_from = self.mixture, self.grouping, n_groups, self.length, least_share, *poses
@@ -219,7 +219,7 @@ class Labeller:
         axes = np.linalg.eigh((means * weights[:, None]).T @ means)[1][:, ::-1][:, :FIELDS]
         # Which way an axis points is up to the library; a model must mean the same everywhere.
         axes *= np.sign(axes[np.abs(axes).argmax(axis=0), np.arange(axes.shape[1])])
-        fields = self.standardised(work.pose.signature) @ axes
+        fields = self.standardized(work.pose.signature) @ axes
         return np.pad(fields, ((0, 0), (0, FIELDS - axes.shape[1])))
 
 
@@ -235,5 +235,5 @@ def _kept_side_field(work: Workpiece, regions: Regions, atlas: RegionAtlas, side
 
 def _sides_seen_in(work: Workpiece, field: FloatArray, polygon_of: IntArray, labels: IntArray) -> IntArray:
     """(p,) side of each polygon as one pose has it."""
-    neighbours = work.memo.get("polygons", (polygon_of,), lambda: work.neighbours.between_polygons(polygon_of))
-    return sides_of_parts(work.surface, field, polygon_of, labels, MIN_SHARE, neighbours)
+    neighbors = work.memo.get("polygons", (polygon_of,), lambda: work.neighbors.between_polygons(polygon_of))
+    return sides_of_parts(work.surface, field, polygon_of, labels, MIN_SHARE, neighbors)

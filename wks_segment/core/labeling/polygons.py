@@ -33,7 +33,7 @@ class PosedMesh:
     ----------
     areas : (p,) array
         Mean over the poses that show the polygon, as shares of the whole.
-    neighbours : FaceAdjacency
+    neighbors : FaceAdjacency
         Of the polygons.
     """
 
@@ -50,12 +50,12 @@ class PosedMesh:
             layouts.append(layout)
         self._layouts, self._times_seen = layouts, times_seen
         # Of one mesh the borders are the same in every pose; modifiers may hide some of them in one.
-        most = max(range(len(layouts)), key=lambda i: len(layouts[i].neighbours.pairs))
+        most = max(range(len(layouts)), key=lambda i: len(layouts[i].neighbors.pairs))
         self._most, layout = most, layouts[most]
-        others = sum(other.centres for other in layouts) / np.maximum(times_seen, 1)[:, None]
-        self._centres = np.where(layout.seen[:, None], layout.centres, others)
+        others = sum(other.centers for other in layouts) / np.maximum(times_seen, 1)[:, None]
+        self._centers = np.where(layout.seen[:, None], layout.centers, others)
         self.areas /= np.maximum(times_seen, 1)
-        self.neighbours = layout.neighbours
+        self.neighbors = layout.neighbors
 
     @property
     def n_polygons(self) -> int:
@@ -79,7 +79,7 @@ class PosedMesh:
                 progress((i + 1) / len(poses))
         return total / np.maximum(self._times_seen, 1)[:, None]
 
-    def labelled(
+    def labeled(
         self,
         poses: Sequence[Workpiece],
         posteriors: FloatArray,
@@ -101,9 +101,9 @@ class PosedMesh:
         length : float
             Smoothing length in units of the square root of the area; 0: the likeliest label of each polygon.
         least_share : float
-            Connected parts under this share of the area join a neighbour.
+            Connected parts under this share of the area join a neighbor.
         marked : (q, 2) int array, optional
-            Neighbouring polygons between which a border is welcome.
+            Neighboring polygons between which a border is welcome.
         crease, width : float
             How much creases draw borders, and over how many smoothing lengths; see `crease_weights`, `cut_borders`.
         least_of_largest : float
@@ -111,7 +111,7 @@ class PosedMesh:
 
         Returns
         -------
-        (p,) int array of labels, -1 for a polygon without a triangle, and the neighbours among polygons, with loose
+        (p,) int array of labels, -1 for a polygon without a triangle, and the neighbors among polygons, with loose
         pieces tied to what adopted them.
         """
         labels = np.where(self._times_seen > 0, posteriors.argmax(axis=1), -1)
@@ -119,11 +119,11 @@ class PosedMesh:
             layout = self._layouts[self._most]
             weights = weights_of_curvature(poses[self._most].curvature[layout.across], crease)
             if marked is not None:
-                weights = np.where(self.neighbours.among(marked), MARKED * weights, weights)
+                weights = np.where(self.neighbors.among(marked), MARKED * weights, weights)
             labels = cut_borders(
-                posteriors, self.areas, self._centres, self.neighbours, weights, length, labels, width=width
+                posteriors, self.areas, self._centers, self.neighbors, weights, length, labels, width=width
             )
-        return merge_crumbs(labels, self.areas, self._centres, self.neighbours, least_share, least_of_largest)
+        return merge_crumbs(labels, self.areas, self._centers, self.neighbors, least_share, least_of_largest)
 
 
 @dataclass(frozen=True)
@@ -135,22 +135,22 @@ class _Layout:
     seen : (p,) bool array
         Whether any triangle is of the polygon.
     areas : (p,) array
-    centres : (p, 3) array
+    centers : (p, 3) array
         0 where not seen.
     mean : (p, m) sparse array
         From triangles to polygons, by area.
     across : (b,) bool array
-        Which of the neighbours among the triangles are of different polygons.
-    neighbours : FaceAdjacency
+        Which of the neighbors among the triangles are of different polygons.
+    neighbors : FaceAdjacency
         Of the polygons.
     """
 
     seen: BoolArray
     areas: FloatArray
-    centres: FloatArray
+    centers: FloatArray
     mean: csr_matrix
     across: BoolArray
-    neighbours: FaceAdjacency
+    neighbors: FaceAdjacency
 
     @classmethod
     def of(cls, pose: Workpiece, polygon_of: IntArray, n_polygons: int) -> _Layout:
@@ -162,12 +162,12 @@ class _Layout:
         total = sum_over @ weight
         seen = np.asarray(total > 0)
         mean = csr_matrix(diags(1 / np.where(seen, total, 1)) @ sum_over @ diags(weight))
-        centres = original.vertices[original.faces].mean(axis=1) / np.sqrt(original.area)
+        centers = original.vertices[original.faces].mean(axis=1) / np.sqrt(original.area)
         return cls(
             seen,
             total * seen,
-            np.asarray(mean @ centres),
+            np.asarray(mean @ centers),
             mean,
-            pose.neighbours.across(polygon_of),
-            pose.neighbours.between_polygons(polygon_of),
+            pose.neighbors.across(polygon_of),
+            pose.neighbors.between_polygons(polygon_of),
         )

@@ -85,15 +85,15 @@ class Regions:
         large = np.where(self.region < len(self.segment), self.region, -1)
         return Traits.of(pose, fields, large, self.segment)
 
-    def centres(self, mesh: TriangleMesh) -> FloatArray:
-        """(r, 3) centre of each of the r largest in units of the square root of the area; x from the middle."""
+    def centers(self, mesh: TriangleMesh) -> FloatArray:
+        """(r, 3) center of each of the r largest in units of the square root of the area; x from the middle."""
         places = mesh.vertices[mesh.faces].mean(axis=1) / np.sqrt(mesh.area)
         middle = np.average(places[:, 0], weights=mesh.face_areas)
         count = int(self.region.max()) + 1
         weights = mesh.face_areas + np.finfo(float).tiny
         sums = np.stack([np.bincount(self.region, weights * axis, count) for axis in places.T], axis=1)
-        centres = sums / np.bincount(self.region, weights, count)[:, None]
-        return np.asarray(centres[: len(self.segment)] - (middle, 0, 0))
+        centers = sums / np.bincount(self.region, weights, count)[:, None]
+        return np.asarray(centers[: len(self.segment)] - (middle, 0, 0))
 
     def numbered(self, names: IntArray, n_known: int) -> IntArray:
         """(m,) name of each face's region, given those of the r largest; others are numbered on."""
@@ -182,12 +182,12 @@ class RegionAtlas:
     noise: FloatArray
 
     @classmethod
-    def learned(cls, n_groups: int, poses: Sequence[Traits], centres: FloatArray, alike: bool = False) -> RegionAtlas:
-        """From one or several poses, and the (r, 3) centres of the first one's regions, best at rest.
+    def learned(cls, n_groups: int, poses: Sequence[Traits], centers: FloatArray, alike: bool = False) -> RegionAtlas:
+        """From one or several poses, and the (r, 3) centers of the first one's regions, best at rest.
 
         `alike`: the poses are of one mesh, and have their regions in the same order.
         """
-        side = np.zeros(len(centres), dtype=np.int64)
+        side = np.zeros(len(centers), dtype=np.int64)
         atlas = cls(n_groups, poses[0], side, _scaled(NOISE, poses[0]))
         # A mean over poses finds regions of each more surely than the first pose does.
         for _ in range(2):
@@ -197,7 +197,7 @@ class RegionAtlas:
             if len(poses) > 1:
                 noise = np.maximum(_spread(mean, poses, names), _scaled(LEAST_NOISE, mean))
             atlas = cls(n_groups, mean, side, noise)
-        return replace(atlas, side=sides(centres, poses[0].segment, atlas.mirrored()))
+        return replace(atlas, side=sides(centers, poses[0].segment, atlas.mirrored()))
 
     def sides_of(self, names: IntArray) -> IntArray:
         """Side of each region that was learned, by its number; 0 of others."""
@@ -285,27 +285,27 @@ class RegionAtlas:
         return np.asarray(np.sqrt(len(placed)) * squared)
 
 
-def sides(centres: FloatArray, segment: IntArray, mirrored: IntArray) -> IntArray:
+def sides(centers: FloatArray, segment: IntArray, mirrored: IntArray) -> IntArray:
     """(r,) 1 for regions on the left, −1 for those on the right of which there is one of the same segment opposite.
 
     Opposite is what mirroring brings close to it; else, of what is bent or turned, what is it in the mirror image.
 
     Parameters
     ----------
-    centres : (r, 3) array
+    centers : (r, 3) array
         Of regions in units of the square root of the area, the mirror plane being x = 0.
     segment : (r,) int array
     mirrored : (r,) int array
         Which region each is in the mirror image, r or more for none of them.
     """
-    distances = cdist(centres * (-1, 1, 1), centres)
+    distances = cdist(centers * (-1, 1, 1), centers)
     distances[segment[:, None] != segment] = np.inf
     nearest = distances.argmin(axis=1)
-    across = centres[:, 0] * centres[nearest, 0] < 0
-    side = _told_apart(centres[:, 0], nearest) * across
+    across = centers[:, 0] * centers[nearest, 0] < 0
+    side = _told_apart(centers[:, 0], nearest) * across
     opposite = np.where(mirrored < len(segment), mirrored, np.arange(len(segment)))
     neither = (side == 0) & (side[opposite] == 0)
-    return np.where(neither, _told_apart(centres[:, 0], opposite, BENT), side)
+    return np.where(neither, _told_apart(centers[:, 0], opposite, BENT), side)
 
 
 def _told_apart(x: FloatArray, opposite: IntArray, least: float = MIDDLE) -> IntArray:
@@ -331,7 +331,7 @@ def sides_of_parts(
     polygon_of: IntArray,
     labels: IntArray,
     least_share: float,
-    neighbours: FaceAdjacency,
+    neighbors: FaceAdjacency,
 ) -> IntArray:
     """(p,) side of each polygon: 1 left, −1 right, 0 for those of parts without one of the same label opposite.
 
@@ -346,11 +346,11 @@ def sides_of_parts(
         Of the polygons.
     least_share : float
         Parts under this share of the area are on the side of what is next to them.
-    neighbours : FaceAdjacency
+    neighbors : FaceAdjacency
         Of the polygons.
     """
     original = surface.original
-    part = connected_regions(labels, neighbours)
+    part = connected_regions(labels, neighbors)
     count = int(part.max()) + 1
     label_of = np.zeros(count, dtype=np.int64)
     label_of[part] = labels
@@ -365,12 +365,12 @@ def sides_of_parts(
     opposite = (label_of[sided][:, None] == label_of[sided]) & (np.outer(mean[sided], mean[sided]) < 0) & alike
     side = np.zeros(count, dtype=np.int64)
     side[sided] = np.sign(mean[sided]) * opposite.any(axis=1)
-    centres = original.vertices[original.faces].mean(axis=1)[seen]
+    centers = original.vertices[original.faces].mean(axis=1)[seen]
     for label in np.unique(label_of[~large]):
         ground = np.flatnonzero(large[of_faces] & (label_of[of_faces] == label))
         crumbs = np.flatnonzero(~large[of_faces] & (label_of[of_faces] == label))
         if len(ground) and len(crumbs):
-            side[of_faces[crumbs]] = side[of_faces[ground[cKDTree(centres[ground]).query(centres[crumbs])[1]]]]
+            side[of_faces[crumbs]] = side[of_faces[ground[cKDTree(centers[ground]).query(centers[crumbs])[1]]]]
     return np.asarray(side[part])
 
 

@@ -36,7 +36,7 @@ class Layout:
     Attributes
     ----------
     mixtures
-        In the space of standardised signatures.
+        In the space of standardized signatures.
     grounds
         Of each pose.
     contacts
@@ -59,10 +59,10 @@ class Layout:
         cls,
         poses: Sequence[PoseSignature],
         mixtures: Sequence[GaussianMixture],
-        standardised: Callable[[FloatArray], FloatArray],
+        standardized: Callable[[FloatArray], FloatArray],
         tick: Callable[[float], None],
     ) -> Layout:
-        """Lay mixtures on poses; `standardised` leads from the signature of a pose to what enters the mixture."""
+        """Lay mixtures on poses; `standardized` leads from the signature of a pose to what enters the mixture."""
         contacts: list[list[Contacts]] = [[] for _ in mixtures]
         likeliest: list[list[IntArray]] = [[] for _ in mixtures]
         samples: list[list[FloatArray]] = [[] for _ in mixtures]
@@ -76,7 +76,7 @@ class Layout:
 
             of_pose(0.0)
             ground = Ground.of(pose.surface, lambda share, of_pose=of_pose: of_pose(LAID * share))  # type: ignore[misc]
-            on_pose = standardised(pose.signature)
+            on_pose = standardized(pose.signature)
             grounds.append(ground)
             flow = HeatFlow(pose.surface.mesh, SMOOTHING_LENGTH)
             for j, mixture in enumerate(mixtures):

@@ -1,4 +1,4 @@
-"""A Gaussian mixture over weighted samples, fitted by expectation–maximisation that cannot collapse.
+"""A Gaussian mixture over weighted samples, fitted by expectation–maximization that cannot collapse.
 
 scikit-learn's mixture takes no sample weights and has no covariance that all components share and that is diagonal,
 which is the paper's remedy against over-fitting; hence our own. Its k-means starts it.
@@ -111,7 +111,7 @@ def fit_mixtures(
     keep: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> list[GaussianMixture]:
-    """Fit mixtures to weighted samples by expectation–maximisation, started by k-means.
+    """Fit mixtures to weighted samples by expectation–maximization, started by k-means.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def fit_mixtures(
         if len(np.unique(start)) < n_components:
             raise TooFewSamplesError(n_components, len(np.unique(start)))
         candidates.append(
-            _maximise_likelihood(
+            _maximize_likelihood(
                 sketch, sketch_shares, np.eye(n_components)[start], covariance_type, floor,
                 lambda share, begun=i: tick(SKETCHED * (begun + share) / len(seeds)),  # type: ignore[misc]
             )
@@ -176,7 +176,7 @@ def fit_mixtures(
     ][:keep]
     refined = []
     for i, (candidate, _) in enumerate(different):
-        mixture, _ = _maximise_likelihood(
+        mixture, _ = _maximize_likelihood(
             samples, shares, candidate.posteriors(samples), covariance_type, floor,
             lambda share, begun=i: tick(SKETCHED + (1 - SKETCHED) * (begun + share) / len(different)),  # type: ignore[misc]
         )  # fmt: skip
@@ -193,13 +193,13 @@ def variance_floor(samples: FloatArray, shares: FloatArray) -> float:
 def drawn_evenly(shares: FloatArray, count: int) -> IntArray:
     """(count,) samples that stand for all of them: at equal steps along their (n,) shares, which sum to 1.
 
-    A heavy sample comes several times. Neighbours in memory are neighbours on a surface, so that no place is left out.
+    A heavy sample comes several times. Neighbors in memory are neighbors on a surface, so that no place is left out.
     """
     steps = (np.arange(count) + 0.5) / count
     return np.asarray(np.minimum(np.searchsorted(np.cumsum(shares), steps), len(shares) - 1))
 
 
-def _maximise_likelihood(
+def _maximize_likelihood(
     samples: FloatArray,
     shares: FloatArray,
     start: FloatArray,
@@ -211,7 +211,7 @@ def _maximise_likelihood(
     previous = -np.inf
     squares = None
     if covariance_type not in ("full", "tied"):
-        # What both steps need of the samples if covariances are diagonal, once. They come standardised, so that sums of
+        # What both steps need of the samples if covariances are diagonal, once. They come standardized, so that sums of
         # squares lose no digits, also not in single precision, which takes half the time.
         samples = samples.astype(np.float32)
         squares = samples**2
@@ -219,7 +219,7 @@ def _maximise_likelihood(
     shares = shares.astype(samples.dtype)
     for i in range(MAX_ITERATIONS):
         tick(i / MAX_ITERATIONS)
-        mixture = maximise(samples, squares, responsibilities * shares[:, None], covariance_type, floor)
+        mixture = maximize(samples, squares, responsibilities * shares[:, None], covariance_type, floor)
         logs = _log_gaussians(samples, squares, mixture.means, mixture.covariances, covariance_type)
         logs += np.log(mixture.weights).astype(logs.dtype)
         highest = logs.max(axis=1, keepdims=True)
@@ -233,7 +233,7 @@ def _maximise_likelihood(
     return mixture, current
 
 
-def maximise(
+def maximize(
     samples: FloatArray,
     squares: FloatArray | None,
     masses: FloatArray,
@@ -259,8 +259,8 @@ def maximise(
     return GaussianMixture(covariance_type, weights / weights.sum(), means, covariances)
 
 
-def _scatter(centred: FloatArray, mass: FloatArray) -> FloatArray:
-    return (centred * mass[:, None]).T @ centred
+def _scatter(centered: FloatArray, mass: FloatArray) -> FloatArray:
+    return (centered * mass[:, None]).T @ centered
 
 
 def _log_gaussians(
@@ -270,7 +270,7 @@ def _log_gaussians(
     covariances: FloatArray,
     covariance_type: CovarianceType,
 ) -> FloatArray:
-    """(n, K) log densities, without the weights; `squares` of samples that are centred, if they are at hand."""
+    """(n, K) log densities, without the weights; `squares` of samples that are centered, if they are at hand."""
     n_components, dimension = means.shape
     if covariance_type in ("full", "tied"):
         matrices = np.broadcast_to(covariances, (n_components, dimension, dimension))
@@ -287,9 +287,9 @@ def _log_gaussians(
         # (1, d) if components share it: what only depends on the sample is then computed once for all.
         variances = covariances[:, None] if covariance_type == "spherical" else np.atleast_2d(covariances)
         half_log_determinants = np.log(np.broadcast_to(variances, (len(variances), dimension))).sum(axis=1) / 2
-        # Σ (x − μ)² / v, multiplied out so that it is two matrix products. Centred first, against cancellation.
-        centre = means.mean(axis=0)
-        x, mu = (samples - centre, means - centre) if squares is None else (samples, means)
+        # Σ (x − μ)² / v, multiplied out so that it is two matrix products. Centered first, against cancellation.
+        center = means.mean(axis=0)
+        x, mu = (samples - center, means - center) if squares is None else (samples, means)
         squared = x**2 if squares is None else squares
         inverse = np.broadcast_to(1 / variances, (len(variances), dimension))
         dtype = x.dtype

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..mesh.triangle_mesh import FloatArray, IntArray
-from .gaussian_mixture import GaussianMixture, maximise, variance_floor
+from .gaussian_mixture import GaussianMixture, maximize, variance_floor
 
 LEFT_OUT = 0.1
 """Share of the area, the least likely, that does not count: what a pose hides or glues together, as a hand on a thigh,
@@ -48,6 +48,6 @@ def left_out_likelihoods(
     for i in np.unique(group):
         mine = group == i
         others = masses * ~mine[:, None]
-        without = maximise(samples, squares, others / others.sum(), mixture.covariance_type, floor)
+        without = maximize(samples, squares, others / others.sum(), mixture.covariance_type, floor)
         found[mine] = without.log_likelihoods(samples[mine])
     return found

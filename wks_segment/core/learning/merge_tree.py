@@ -46,7 +46,7 @@ class Ground:
     adjacency : FaceAdjacency
         Of the m original faces.
     lengths : (p,) array
-        Weighted border length between neighbours, for a surface of area 1.
+        Weighted border length between neighbors, for a surface of area 1.
     part : (s, m) int array
         Part of each face as a person would cut this pose, coarse to fine.
     """
@@ -58,7 +58,7 @@ class Ground:
 
     @classmethod
     def of(cls, surface: Surface, tick: Callable[[float], None] | None = None) -> Ground:
-        """Find the neighbours, weigh their borders and cut; `tick` is called with the share that is done."""
+        """Find the neighbors, weigh their borders and cut; `tick` is called with the share that is done."""
         original = surface.original
         adjacency = FaceAdjacency.of(surface.welded_faces, original.vertices)
         weights, curvature = border_weights(surface, adjacency, tick)
@@ -104,8 +104,8 @@ class Contacts:
         """Of one pose, given (m, K) smoothed posteriors of its faces."""
         n_components = posteriors.shape[1]
         original, adjacency = ground.surface.original, ground.adjacency
-        centres = original.vertices[original.faces].mean(axis=1)
-        labels, _ = merge_crumbs(posteriors.argmax(axis=1), original.face_areas, centres, adjacency, LEAST_REGION)
+        centers = original.vertices[original.faces].mean(axis=1)
+        labels, _ = merge_crumbs(posteriors.argmax(axis=1), original.face_areas, centers, adjacency, LEAST_REGION)
         shares = original.face_areas / original.area
         a, b = labels[adjacency.pairs].T
         borders, areas = np.zeros((n_components, n_components)), np.zeros(n_components)

@@ -141,7 +141,7 @@ class Plan:
 
     def laid_out(
         self,
-        standardised: Callable[[FloatArray], FloatArray],
+        standardized: Callable[[FloatArray], FloatArray],
         settings: Sequence[Any],
         cache: Cache | None,
         mixing: Callable[[float], None],
@@ -151,7 +151,7 @@ class Plan:
 
         Parameters
         ----------
-        standardised
+        standardized
             See `Layout.of`.
         settings
             What it depends on.
@@ -171,7 +171,7 @@ class Plan:
                 mixing(0.0)
         mixtures = self._mixtures(mixing)
         with threadpool_limits(1, "blas"):  # on arrays this small, threads wait for each other
-            layout = Layout.of(self.poses, mixtures, standardised, grouping)
+            layout = Layout.of(self.poses, mixtures, standardized, grouping)
         # With fewer components than meant, these depend on the number of segments.
         if cache is not None and all(
             len(mixture.weights) == self._n_components(mixture.covariance_type) for mixture in mixtures

@@ -1,4 +1,4 @@
-"""Which faces hang together: neighbours, connected regions, crumbs."""
+"""Which faces hang together: neighbors, connected regions, crumbs."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class FaceAdjacency:
 
     @classmethod
     def of(cls, faces: IntArray, vertices: FloatArray) -> FaceAdjacency:
-        """Find the neighbours of (m, 3) faces with corners in (n, 3) vertices."""
+        """Find the neighbors of (m, 3) faces with corners in (n, 3) vertices."""
         edges = edges_of(faces)
         order = np.lexsort((edges[:, 1], edges[:, 0]))
         edges, owner = edges[order], order // 3
@@ -72,14 +72,14 @@ def connected_regions(labels: IntArray, adjacency: FaceAdjacency) -> IntArray:
 def merge_crumbs(
     labels: IntArray,
     areas: FloatArray,
-    centres: FloatArray,
+    centers: FloatArray,
     adjacency: FaceAdjacency,
     min_share: float,
     least_of_largest: float = 0.0,
 ) -> tuple[IntArray, FaceAdjacency]:
-    """Give every connected region under a share of the area the label of a neighbour.
+    """Give every connected region under a share of the area the label of a neighbor.
 
-    The smallest goes first, to the neighbour with which it shares most border. A loose piece that is too small as a
+    The smallest goes first, to the neighbor with which it shares most border. A loose piece that is too small as a
     whole takes the label of the face nearest to it that belongs to a large enough region, as an eye does that of its
     head, and counts as adjacent to it from then on.
 
@@ -88,7 +88,7 @@ def merge_crumbs(
     labels : (m,) int array
         -1: a face that takes no part.
     areas : (m,) array
-    centres : (m, 3) array
+    centers : (m, 3) array
     adjacency : FaceAdjacency
     min_share : float
         Between 0 and 1.
@@ -124,17 +124,17 @@ def merge_crumbs(
         if owner[crumb] != crumb or (size[crumb] >= least and not stray[crumb]):
             continue
         shared: dict[int, float] = defaultdict(float)
-        for neighbour, length in borders[crumb].items():
-            shared[root(neighbour)] += length
+        for neighbor, length in borders[crumb].items():
+            shared[root(neighbor)] += length
         shared.pop(int(crumb), None)
         if not shared:
             continue
         target = max(shared, key=lambda i: (shared[i], -i))
-        # Neighbours of the crumb's label are one region with it only from now on, and keep their own borders.
+        # Neighbors of the crumb's label are one region with it only from now on, and keep their own borders.
         owner[crumb] = target
         size[target] += size[crumb]
-        for neighbour, length in borders.pop(int(crumb)).items():
-            borders[target][neighbour] = borders[target].get(neighbour, 0.0) + length
+        for neighbor, length in borders.pop(int(crumb)).items():
+            borders[target][neighbor] = borders[target].get(neighbor, 0.0) + length
     owner = np.array([root(i) for i in range(count)])
     merged = label_of[owner][region]
     loose = (size[owner][region] < least) & (merged >= 0)
@@ -142,7 +142,7 @@ def merge_crumbs(
     if not (loose.any() and large.any()):
         return merged, adjacency
     loose, large = np.flatnonzero(loose), np.flatnonzero(large)
-    adopting = large[cKDTree(centres[large]).query(centres[loose])[1]]
+    adopting = large[cKDTree(centers[large]).query(centers[loose])[1]]
     merged[loose] = merged[adopting]
     ties = np.stack([loose, adopting], axis=1)
     return merged, FaceAdjacency(
@@ -151,7 +151,7 @@ def merge_crumbs(
 
 
 def _border_lengths(region: IntArray, adjacency: FaceAdjacency) -> dict[int, dict[int, float]]:
-    """For each region the length of border that it shares with each neighbour."""
+    """For each region the length of border that it shares with each neighbor."""
     a, b = region[adjacency.pairs].T
     across = a != b
     shape = (int(region.max()) + 1,) * 2

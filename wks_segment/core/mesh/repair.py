@@ -12,17 +12,17 @@ from scipy.sparse.csgraph import connected_components
 from .triangle_mesh import FloatArray, IntArray, TriangleMesh, edge_lengths, edges_of, unique_edges
 
 SPIKE_HEIGHT = 3.0
-"""Distance of a spike from the middle of its neighbours, at least, in units of the mesh's median edge …"""
+"""Distance of a spike from the middle of its neighbors, at least, in units of the mesh's median edge …"""
 SPIKE_SLENDERNESS = 2.0
-"""… and in units of the mean edge between its neighbours."""
+"""… and in units of the mean edge between its neighbors."""
 SPIKE_ROUNDS = 3
-"""Neighbouring spikes hide each other, so that all come to light only one after another."""
+"""Neighboring spikes hide each other, so that all come to light only one after another."""
 HOLE_PERIMETER = 0.5
 """Largest perimeter of a hole that is closed, as a fraction of the square root of the area of its loose part."""
 
 
 def without_spikes(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """(n, 3) positions in which each vertex that sticks out of its surroundings is in the middle of its neighbours.
+    """(n, 3) positions in which each vertex that sticks out of its surroundings is in the middle of its neighbors.
 
     Shot noise: a single vertex thrown far off makes long slivers, which add area and pin the eigenfunctions. The tip of
     a horn or a finger is not meant: it stands on edges as long as itself, or is no longer than the other edges.
@@ -30,7 +30,7 @@ def without_spikes(vertices: FloatArray, faces: IntArray) -> FloatArray:
     n = len(vertices)
     lengths = edge_lengths(vertices, faces)
     typical = np.median(lengths)
-    # No vertex is further from the middle of its neighbours than from the furthest of them: most need no second look.
+    # No vertex is further from the middle of its neighbors than from the furthest of them: most need no second look.
     long = lengths > SPIKE_HEIGHT * typical
     suspect = np.zeros(n, dtype=bool)
     for i in range(3):
@@ -44,7 +44,7 @@ def without_spikes(vertices: FloatArray, faces: IntArray) -> FloatArray:
     spiky = np.zeros(n, dtype=bool)
 
     def middles() -> FloatArray:
-        """Of the sound neighbours of each vertex; its own place if there are none."""
+        """Of the sound neighbors of each vertex; its own place if there are none."""
         sound = adjacency @ diags((~spiky).astype(np.float64))
         total = np.asarray(sound.sum(axis=1)).reshape(-1, 1)
         return np.where(total > 0, (sound @ vertices) / np.maximum(total, 1), vertices)
@@ -95,8 +95,8 @@ def small_holes(mesh: TriangleMesh) -> tuple[FloatArray, IntArray]:
     halfway = (mesh.vertices[rim] + middle[hole]) / 2
     inner = np.zeros(mesh.n_vertices, dtype=np.int64)
     inner[rim] = mesh.n_vertices + np.arange(len(rim))
-    centre = np.zeros(mesh.n_vertices, dtype=np.int64)
-    centre[rim] = mesh.n_vertices + len(rim) + hole
+    center = np.zeros(mesh.n_vertices, dtype=np.int64)
+    center[rim] = mesh.n_vertices + len(rim) + hole
     a, b = border.T
-    caps = [(a, b, inner[b]), (a, inner[b], inner[a]), (inner[a], inner[b], centre[a])]
+    caps = [(a, b, inner[b]), (a, inner[b], inner[a]), (inner[a], inner[b], center[a])]
     return np.concatenate([halfway, middle]), np.concatenate([np.stack(cap, axis=1) for cap in caps])

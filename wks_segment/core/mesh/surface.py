@@ -114,7 +114,7 @@ def connect(*poses: TriangleMesh, rest: TriangleMesh | None = None, pieces: Piec
     poses
         The same faces between vertices at other places; pieces that meet in some poses only stay apart in all.
     rest : TriangleMesh, optional
-        The same mesh as it was modelled. Loose parts are then tied as they are there, and so in the same way for poses
+        The same mesh as it was modeled. Loose parts are then tied as they are there, and so in the same way for poses
         that are not here.
     pieces : "joined" or "separate"
         Whether loose parts are tied together.

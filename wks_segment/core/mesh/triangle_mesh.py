@@ -26,7 +26,7 @@ class TriangleMesh:
     faces : (m, 3) array of int
         Vertex indices of each triangle, in either orientation.
     links : (l, 2) array of int, optional
-        Pairs of vertices that are tied to each other as if they were neighbours, where loose parts meet.
+        Pairs of vertices that are tied to each other as if they were neighbors, where loose parts meet.
     lengths : (m, 3) array of float, optional
         Lengths of the edges ab, bc and ca of each triangle, where they are not straight lines between its corners (see
         `delaunay`). A face may name a vertex twice then.

@@ -1,4 +1,4 @@
-"""A pose in work: what labelling finds out about it is kept, so that other settings are a matter of moments."""
+"""A pose in work: what labeling finds out about it is kept, so that other settings are a matter of moments."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def _same(before: tuple[Any, ...], now: tuple[Any, ...]) -> bool:
 
 
 class Workpiece:
-    """One pose, to be labelled again and again.
+    """One pose, to be labeled again and again.
 
     Takes the place of its `PoseSignature` in every method of a model, with the same result. Holds several times its
     memory, so it should go when the work is done. Not for several threads at once.
@@ -70,7 +70,7 @@ class Workpiece:
         return self.pose.surface
 
     @cached_property
-    def neighbours(self) -> FaceAdjacency:
+    def neighbors(self) -> FaceAdjacency:
         """Of the original faces, for a surface of area 1."""
         original = self.surface.original
         return FaceAdjacency.of(self.surface.welded_faces, original.vertices / np.sqrt(original.area))
@@ -84,4 +84,4 @@ class Workpiece:
     @cached_property
     def curvature(self) -> FloatArray:
         """(p,) curvature from one of these to the next."""
-        return coarse_curvature(self.surface, self.neighbours, self.flows)
+        return coarse_curvature(self.surface, self.neighbors, self.flows)

@@ -18,7 +18,7 @@ _MAPS = ("vertex_of", "face_of", "welded_faces")
 
 @dataclass(frozen=True)
 class PoseSignature:
-    """One pose, described: what takes the time, to be computed once and used for learning and labelling.
+    """One pose, described: what takes the time, to be computed once and used for learning and labeling.
 
     Attributes
     ----------

@@ -20,7 +20,7 @@ from .laplacian import stiffness_matrix, unit_area_masses
 HEAVIEST = 1.5
 """A cell of more than this many times the mean mass is split: on a thin limb, a cube of space holds a whole tube."""
 LIGHTEST = 0.2
-"""A cell of less than this many times the mean mass joins a neighbour, if it does not become too heavy."""
+"""A cell of less than this many times the mean mass joins a neighbor, if it does not become too heavy."""
 SPLITS = 5
 """Rounds of splitting, each into half the size."""
 REACH, REACH_SMOOTHED, REACH_WIDE = 2.0, 1.8, 2.6
@@ -33,7 +33,7 @@ DAMPING = np.float32(0.66)
 LEAST_WEIGHT = 1e-3
 """Weight of a vertex's own cell if even its middle is out of reach."""
 RIDGE = 1e-3
-"""Decides what neighbours do not: across a flat surface, or where there are too few, a fit is constant."""
+"""Decides what neighbors do not: across a flat surface, or where there are too few, a fit is constant."""
 ROWS = 15_000
 """Vertices whose functions are fitted at once: their moments stay in the cache."""
 
@@ -90,7 +90,7 @@ def _components(first: IntArray, second: IntArray, n: int) -> tuple[IntArray, in
 def _join_light_cells(
     cell: IntArray, edges: tuple[IntArray, IntArray], mass: FloatArray, mean: float
 ) -> tuple[IntArray, int]:
-    """Let light cells join the neighbour with which they share most edges."""
+    """Let light cells join the neighbor with which they share most edges."""
     a, b = cell[edges[0]], cell[edges[1]]
     a, b = np.concatenate([a, b]), np.concatenate([b, a])
     fits = (mass[a] < LIGHTEST * mean) & (mass[b] >= LIGHTEST * mean) & (mass[a] + mass[b] < HEAVIEST * mean) & (a != b)
@@ -235,10 +235,10 @@ def _moving_least_squares(
 
 
 def _middle_vertices(positions: FloatArray, masses: FloatArray, cell: IntArray, count: int) -> IntArray:
-    """(count,) the vertex of each cell that is nearest to its centre of mass."""
+    """(count,) the vertex of each cell that is nearest to its center of mass."""
     mass = _sums(masses, cell, count)
-    centre = np.stack([_sums(masses * x, cell, count) for x in positions.T], axis=1)
-    away = ((positions - (centre / mass[:, None])[cell]) ** 2).sum(axis=1)
+    center = np.stack([_sums(masses * x, cell, count) for x in positions.T], axis=1)
+    away = ((positions - (center / mass[:, None])[cell]) ** 2).sum(axis=1)
     order = np.lexsort((away, cell))
     return order[np.searchsorted(cell[order], np.arange(count))]
 

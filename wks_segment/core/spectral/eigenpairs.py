@@ -1,6 +1,6 @@
 """The first eigenpairs of the Laplace–Beltrami operator, checked after the solve.
 
-Two ways, both on one sparse factorisation that is fast with many right-hand sides (`factor`):
+Two ways, both on one sparse factorization that is fast with many right-hand sides (`factor`):
 
 "exact"  block Lanczos on a shifted inverse (`lanczos`), residuals and orthonormality to 1e-8, and an inertia count that
          shows that no pair was missed.
@@ -59,7 +59,7 @@ def eigenpairs(
     accuracy : "fast" or "exact"
         "exact": relative residuals (beyond rounding, which very thin triangles magnify) and departure from
         mass-orthonormality at most 1e-8, and an inertia count shows that no pair was missed. "fast": as accurate as a
-        segmentation needs, the Wave Kernel Signature within a few tenths of a per cent; single precision.
+        segmentation needs, the Wave Kernel Signature within a few tenths of a percent; single precision.
     progress : callable, optional
         Called with the share of the work that is done, 0 to 1. An error that it raises ends the solve.
 
@@ -180,7 +180,7 @@ def _on_one_thread(panels: Panels, tick: Callable[[float], None]) -> Panels:
 
 @dataclass(frozen=True)
 class _Problem:
-    """The surface of area 1, its vertices along a curve through space: neighbours are near to each other in memory.
+    """The surface of area 1, its vertices along a curve through space: neighbors are near to each other in memory.
 
     `place` is the place of each vertex of the mesh along the curve.
     """

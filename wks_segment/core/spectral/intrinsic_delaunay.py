@@ -82,7 +82,7 @@ class _Flips:
         Vertex at which each side begins.
     lengths : (3 m,) array
     twin : (3 m,) int array
-        The side of the neighbour that each is sewn to.
+        The side of the neighbor that each is sewn to.
     alike : (3 m,) bool array
         Whether twins run in the same direction: faces of mixed orientation.
     unsure : (3 m,) bool array

@@ -1,7 +1,7 @@
 """The exact eigensolver: block Lanczos on a shifted inverse, with every pair checked and none missed.
 
 The shift lies inside the spectrum, below the last pairs that are asked for: these converge slowest, and near to the
-shift they converge soon, so that the basis stays small (Ericsson and Ruhe, 1980). The factorisation counts the
+shift they converge soon, so that the basis stays small (Ericsson and Ruhe, 1980). The factorization counts the
 eigenvalues below its shift, which shows whether a pair was missed.
 """
 
@@ -42,7 +42,7 @@ LAST_LOOK = 4.0
 SPENT = 1e-12
 """Size of a new direction, relative to what it comes from, below which it is rounding."""
 COLUMNS = 32
-"""Columns in one sparse product: what a row and its neighbours need should stay in the cache."""
+"""Columns in one sparse product: what a row and its neighbors need should stay in the cache."""
 LANCZOS_TOLERANCE = 1e-10
 """Residual of the inverse at which Lanczos ends, relative to the value."""
 
@@ -107,7 +107,7 @@ def _factor(operator: csr_matrix, level: Level, shift: float) -> NestedDissectio
     try:
         return NestedDissectionFactor(shifted, level.positions, np.float64)
     except SingularError as error:
-        raise SpectrumError(f"the operator cannot be factorised, its triangles are too thin: {error}") from error
+        raise SpectrumError(f"the operator cannot be factorized, its triangles are too thin: {error}") from error
 
 
 def _stable_factor(

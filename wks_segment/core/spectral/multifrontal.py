@@ -1,4 +1,4 @@
-"""A sparse symmetric factorisation for surfaces: fast with hundreds of right-hand sides at once.
+"""A sparse symmetric factorization for surfaces: fast with hundreds of right-hand sides at once.
 
 Multifrontal (Duff and Reid, 1983) on a nested dissection of the vertices by their positions (George, 1973): every
 elimination is dense, so that factor and solve are matrix products. Solving for 380 columns on 40,000 vertices takes a
@@ -19,11 +19,11 @@ from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 LEAF = 120
 """Vertices below which a part is eliminated as a whole."""
 WORK_COLUMNS = 64
-"""Columns of work space with which LAPACK factorises an indefinite front in blocks."""
+"""Columns of work space with which LAPACK factorizes an indefinite front in blocks."""
 
 
 class SingularError(ArithmeticError):
-    """A block of the matrix has no inverse, to the precision of the factorisation."""
+    """A block of the matrix has no inverse, to the precision of the factorization."""
 
 
 @dataclass
@@ -53,7 +53,7 @@ class NestedDissectionFactor:
     matrix : (n, n) sparse matrix
         Symmetric.
     positions : (n, 3) array
-        Where the unknowns lie; neighbours in the matrix should be near to each other.
+        Where the unknowns lie; neighbors in the matrix should be near to each other.
     dtype : float32 or float64
         Precision of the factors and of `solve`.
     dissection : optional
@@ -117,14 +117,14 @@ def _inverse(block: FloatArray) -> tuple[FloatArray, int]:
     """Inverse of a dense symmetric block of which the lower half is given, and its number of negative eigenvalues."""
     if not len(block):
         return block, 0
-    factorise, invert, factorise_indefinite = get_lapack_funcs(("potrf", "trtri", "sytrf"), (block,))
-    factor, failed = factorise(block, lower=1, clean=1)
+    factorize, invert, factorize_indefinite = get_lapack_funcs(("potrf", "trtri", "sytrf"), (block,))
+    factor, failed = factorize(block, lower=1, clean=1)
     if not failed:
         half, failed = invert(factor, lower=1, overwrite_c=1)
         return half.T @ half, 0
     # Not positive definite. A pivot is one number, or a block of two by two, marked below zero, of which one eigenvalue
     # is negative (Bunch and Kaufman, 1977).
-    factor, pivots, failed = factorise_indefinite(block, lower=1, lwork=WORK_COLUMNS * len(block))
+    factor, pivots, failed = factorize_indefinite(block, lower=1, lwork=WORK_COLUMNS * len(block))
     if failed:
         raise SingularError(f"a front of {len(block)} unknowns has no inverse")
     n_negative = np.count_nonzero(factor.diagonal()[pivots > 0] < 0) + np.count_nonzero(pivots < 0) // 2
@@ -158,9 +158,9 @@ def nested_dissection(matrix: csr_matrix, positions: FloatArray) -> Dissection:
         halves = np.argpartition(along, len(part) // 2)
         low, high = part[halves[: len(part) // 2]], part[halves[len(part) // 2 :]]
         side[high] = 1
-        owner, neighbour = _neighbours(indptr, indices, low)
+        owner, neighbor = _neighbors(indptr, indices, low)
         separates: BoolArray = np.zeros(len(low), dtype=bool)
-        separates[owner[side[neighbour] == 1]] = True
+        separates[owner[side[neighbor] == 1]] = True
         side[high] = 0
         children = [dissect(half) for half in (low[~separates], high) if len(half)]
         return close(low[separates], children)
@@ -169,7 +169,7 @@ def nested_dissection(matrix: csr_matrix, positions: FloatArray) -> Dissection:
     return np.concatenate(parts), fronts
 
 
-def _neighbours(indptr: IntArray, indices: IntArray, rows: IntArray) -> tuple[IntArray, IntArray]:
+def _neighbors(indptr: IntArray, indices: IntArray, rows: IntArray) -> tuple[IntArray, IntArray]:
     """For each entry of some rows of a sparse matrix: the number of the row among them, and the column."""
     count = indptr[rows + 1] - indptr[rows]
     start = np.repeat(indptr[rows] - np.concatenate([[0], np.cumsum(count)[:-1]]), count)

@@ -56,7 +56,7 @@ PANEL = 7_500_000
 """Numbers in one panel of functions, 30 MB: wide enough for the solve, and under the 32 MB above which memory that is
 given back goes to the system, and each new array costs a page fault every 4 KB."""
 PRODUCT_COLUMNS = 64
-"""Columns in one sparse product: what a row and its neighbours need should stay in the cache."""
+"""Columns in one sparse product: what a row and its neighbors need should stay in the cache."""
 CHUNK = 1024
 """Rows in one step of what is done entry by entry."""
 
@@ -87,7 +87,7 @@ def hierarchical_eigenpairs(
 
     Returns
     -------
-    (k,) array, and an iterator over pairs of columns and their (n, number of columns) array of float32, M-normalised.
+    (k,) array, and an iterator over pairs of columns and their (n, number of columns) array of float32, M-normalized.
 
     Raises
     ------
@@ -237,7 +237,7 @@ def _lifted(
 ) -> Iterator[tuple[slice, FloatArray]]:
     """Panels of functions from their values at cells, corrected on the surface where a correction is given.
 
-    What is M-normalised on the cells is so on the surface: Galerkin's mass matrix is that of the lifted functions. The
+    What is M-normalized on the cells is so on the surface: Galerkin's mass matrix is that of the lifted functions. The
     values stay those of the cells, which are known before the functions.
     """
     for columns in panels(prolongation.shape[0], len(values)):

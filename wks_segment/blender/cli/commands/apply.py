@@ -13,7 +13,7 @@ from ...workflow import model_library, pipeline
 from ...workflow.model_ranking import rank_poses, said
 from ...workflow.report import Report
 from .common import cache_of, candidates_in, check_outputs, label, largest, read_poses, result_of, settings_of
-from .options import add_labelling, add_means, add_model, add_outputs, add_poses
+from .options import add_labeling, add_means, add_model, add_outputs, add_poses
 
 
 def add(commands: Any) -> None:
@@ -21,7 +21,7 @@ def add(commands: Any) -> None:
     apply = commands.add_parser("apply", help="find the parts of a model in files")
     add_poses(apply)
     add_model(apply)
-    add_labelling(apply)
+    add_labeling(apply)
     add_outputs(apply)
     add_means(apply)
     apply.set_defaults(run=_apply)
@@ -41,7 +41,7 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
         found = candidates_in(options.models, report)
         poses = read_poses(options, report)
         pipeline.check_limits(largest(found), poses, settings_of(options))
-        # What is described for the ranking serves labelling.
+        # What is described for the ranking serves labeling.
         cache = cache or MemoryCache()
         ranking = rank_poses(found, poses, report, progress, cache, options.threads)
         model, name = found[ranking.best.index].model, found[ranking.best.index].name

@@ -19,7 +19,7 @@ from ...workflow import model_library, pipeline
 from ...workflow.pipeline import Wanted
 from ...workflow.report import Report
 from .common import check_picture, read_poses, result_of, settings_of
-from .options import BAKE_OPTIONS, add_labelling, add_settings
+from .options import BAKE_OPTIONS, add_labeling, add_settings
 
 
 def add(commands: Any) -> None:
@@ -38,7 +38,7 @@ def add(commands: Any) -> None:
         "--unwrap", action="store_true", help="Smart UV Project for objects without a UV map; see --blend"
     )
     bake.add_argument("--blend", type=Path, help="write the scene to this file as well, with UV maps and images")
-    add_labelling(bake)
+    add_labeling(bake)
     add_settings(bake, BAKE_OPTIONS)
     bake.set_defaults(run=_bake, action=None, frames=None, shape_keys=None, markers=None, actions=None)
 

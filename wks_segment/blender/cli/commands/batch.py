@@ -33,7 +33,7 @@ from ...errors import UserError
 from ...scene import file_formats
 from .options import (
     add_cache,
-    add_labelling,
+    add_labeling,
     add_model,
     add_output_settings,
     add_pose_sources,
@@ -64,7 +64,7 @@ def add(commands: Any) -> None:
         help="of the files that are written (default: blend)",
     )  # fmt: skip
     add_pose_sources(apply)
-    add_labelling(apply)
+    add_labeling(apply)
     add_output_settings(apply)
     apply.set_defaults(run=_run, jobs_of=_applying)
     rank = kinds.add_parser("rank", help="which of several models fits each file")

@@ -44,7 +44,7 @@ OUTPUT_FLAGS = {
 """The same that are on or off, and what they do."""
 BAKE_OPTIONS = {"--size": "bake_size", "--margin": "bake_margin", "--palette": "palette", "--sides": "sides"}
 """Settings of `bake`."""
-LABELLING = ("--smoothness", "--smallest-part", "--limit-minutes", "--limit-memory")
+LABELING = ("--smoothness", "--smallest-part", "--limit-minutes", "--limit-memory")
 """Settings of commands that label by a model that is there, and take those of the model if they are not given."""
 AUTOMATIC = {"n_segments": "auto_segments"}
 """Numbers that can be left open by the word "auto", and the settings that do it."""
@@ -121,9 +121,9 @@ def add_model(parser: argparse.ArgumentParser) -> None:
     model.add_argument("--models", type=Path, metavar="DIR", help="a folder of models, of which the best one is taken")
 
 
-def add_labelling(parser: argparse.ArgumentParser) -> None:
+def add_labeling(parser: argparse.ArgumentParser) -> None:
     """Settings of commands that label by a model that is there."""
-    for option in LABELLING:
+    for option in LABELING:
         add_setting(parser, option, OPTIONS[option])
 
 
