@@ -1,17 +1,30 @@
-"""The error that a user reads."""
+"""Errors whose message is for the user."""
+
+from __future__ import annotations
+
+from ..core.message import Message
 
 
 class UserError(Exception):
-    """Something in the input that the user can mend; the message names it and says how."""
+    """A problem that the user can solve; the message names what is wrong and says what to do.
+
+    Parameters
+    ----------
+    template : str
+        The message, or with values a template for it: see `Message`.
+    """
+
+    def __init__(self, template: str, **values: object) -> None:
+        super().__init__(Message(template, **values) if values or not isinstance(template, Message) else template)
 
 
 class TooLargeError(UserError):
-    """A job is larger than the user's limit; the message gives its estimate."""
+    """A job needs more time or memory than the user allows; the message gives the estimate."""
 
 
 class ChangedError(UserError):
-    """What was read is no longer as it was; the message says what happened to it."""
+    """What was read has changed meanwhile; the message says how."""
 
 
 class EndedError(UserError):
-    """A job was ended before it was done; the message says why."""
+    """A job was canceled before it was done; the message says why."""

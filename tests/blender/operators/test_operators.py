@@ -21,7 +21,7 @@ from builders import (
     snapshot,
 )
 
-from wks_segment.blender import operators
+from wks_segment.blender import registration
 from wks_segment.blender.outputs.labels import write_labels
 from wks_segment.blender.scene import poses as reader
 from wks_segment.blender.scene.characters import selected_meshes
@@ -446,7 +446,7 @@ def test_damaged_model_of_the_file(learned, settings):
 
 def test_operators_that_change_something_can_be_undone():
     for name in ("learn", "apply", "clear", "load_model"):
-        cls = getattr(operators, f"WKS_SEGMENT_OT_{name}")
+        cls = getattr(registration, f"WKS_SEGMENT_OT_{name}")
         assert {"REGISTER", "UNDO"} <= cls.bl_options, name
 
 
@@ -646,8 +646,8 @@ def test_automatic_number_fits_a_mesh_of_few_faces(settings):
 def drawn(panel):
     """The layout that a panel was drawn on."""
     layout = MagicMock()
-    shown = type("Shown", (main_panel.__bases__[0],), {"layout": layout})()
-    main_panel.draw(shown, bpy.context)
+    shown = type("Shown", (panel.__bases__[0],), {"layout": layout})()
+    panel.draw(shown, bpy.context)
     return layout
 
 

@@ -7,7 +7,7 @@ from unittest.mock import MagicMock
 import bpy
 import pytest
 
-from wks_segment.blender import operators
+from wks_segment.blender import registration
 from wks_segment.blender.props import presets
 from wks_segment.blender.ui import menu
 
@@ -25,7 +25,7 @@ def test_menu_has_the_operators_for_objects():
     layout = drawn(menu.WKS_SEGMENT_MT_object)
     assert layout.operator_context == "INVOKE_DEFAULT"
     named = {call.args[0] for call in layout.operator.call_args_list + layout.operator_menu_enum.call_args_list}
-    assert named <= {cls.bl_idname for cls in operators.CLASSES}
+    assert named <= {cls.bl_idname for cls in registration.OPERATORS}
     assert {"wks_segment.learn", "wks_segment.apply", "wks_segment.bake", "wks_segment.segments_from"} <= named
 
 

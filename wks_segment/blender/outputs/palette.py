@@ -119,16 +119,16 @@ def sided_palette(name: str = DEFAULT) -> FloatArray:
     hue = _hue(lab)
     factor = np.where(np.arange(MAX_COLORS) < USUAL, 1, RARE)
     nearest = np.min([_distance(seen, middle[:, i]) * f for i, f in enumerate(factor)], axis=0)
-    colors = np.tile(colors, (3, 1, 1))
+    sided = np.tile(colors, (3, 1, 1))
     allowed = [_within(lab, lightness, SIDED_CHROMA) for lightness in (recipe.left, recipe.right)]
     for segment, own in enumerate(_hue(oklab(colors))):
         alike = np.cos(hue - own) >= np.cos(recipe.sided_hue)
         for side, within in enumerate(allowed, start=1):
             farthest = int(np.argmax(np.where(alike & within, nearest, -1)))
-            colors[side, segment] = candidates[farthest]
+            sided[side, segment] = candidates[farthest]
             nearest = np.minimum(nearest, _distance(seen, seen[:, farthest]))
-    colors.setflags(write=False)
-    return colors
+    sided.setflags(write=False)
+    return sided
 
 
 def _distance(seen: FloatArray, color: FloatArray) -> FloatArray:

@@ -1,0 +1,53 @@
+"""Texts for people that can be shown in another language.
+
+The core knows no language but English, threads must not ask Blender for a translation, and what the command line
+prints is read by programs. So a message is made in English where it is raised, and keeps its template and its values:
+whoever shows it looks the template up and fills it in again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+
+class Message(str):
+    """An English text with the template and the values that it was made from.
+
+    Parameters
+    ----------
+    template : str
+        With fields as `str.format` has them, each with a name: "{path}: there is no such file".
+    **values
+        Of the fields. One that is a `Message` is translated with the message.
+    """
+
+    template: str
+    values: dict[str, object]
+
+    def __new__(cls, template: str, **values: object) -> Message:
+        """Fill in the template."""
+        text = super().__new__(cls, template.format(**values) if values else template)
+        text.template, text.values = template, values
+        return text
+
+    @classmethod
+    def joined(cls, separator: str, messages: Iterable[str]) -> Message:
+        """Several messages as one, each translated by itself."""
+        values = {f"part{i}": message for i, message in enumerate(messages)}
+        return cls(separator.join(f"{{{name}}}" for name in values), **values)
+
+    def translated(self, lookup: Callable[[str], str]) -> str:
+        """The text in another language, given a function from a template to the same template in that language."""
+        template = lookup(self.template)
+        values = {
+            name: value.translated(lookup) if isinstance(value, Message) else value
+            for name, value in self.values.items()
+        }
+        return template.format(**values) if values else template
+
+
+def message_of(error: BaseException) -> str:
+    """The text of an error; the `Message` itself if it was raised with one, which `str(error)` would lose."""
+    if len(error.args) == 1 and isinstance(error.args[0], str):
+        return error.args[0]
+    return str(error)

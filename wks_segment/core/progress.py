@@ -1,0 +1,84 @@
+"""How far a computation is, and its cancellation.
+
+A caller passes a function that is called with the stage and the share of the work that is done. `Progress` wraps it, so
+that each function deals only with its own share, 0 to 1, whatever part of the whole work it is:
+
+    progress = Progress.of(report)
+    with progress.step(0.3, "mixture") as step:  # the next 30 % of this work
+        mixture = fit(samples, step)             # calls step(0.5) when half of it is done
+    for pose, step in progress.each(poses):      # the rest, in equal steps
+        ...
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TypeVar
+
+T = TypeVar("T")
+Report = Callable[[str, float], None]
+"""Called with the name of a stage and the share of the whole work that is done, 0 to 1. An error that it raises ends
+the work: this is how a job is canceled."""
+
+
+class Progress:
+    """Progress of a work that may be a part of a larger one.
+
+    Parameters
+    ----------
+    report : callable, optional
+        Called with stage and share; nothing is reported if not given.
+    stage : str
+        Name of the stage that is reported.
+    start, end : float
+        Where this work begins and ends within the whole.
+    """
+
+    def __init__(self, report: Report | None = None, stage: str = "", start: float = 0.0, end: float = 1.0) -> None:
+        self.stage = stage
+        self._report = report
+        self._start, self._end = start, end
+        self._begun = 0.0
+
+    @classmethod
+    def of(cls, report: Report | Progress | None, stage: str = "") -> Progress:
+        """Progress that is reported to a function of stage and share; a `Progress` stays as it is."""
+        return report if isinstance(report, Progress) else cls(report, stage)
+
+    @classmethod
+    def of_share(cls, report: Callable[[float], None] | Progress | None) -> Progress:
+        """Progress that is reported to a function of the share alone; a `Progress` stays as it is."""
+        if report is None or isinstance(report, Progress):
+            return report or cls()
+        return cls(lambda stage, share: report(share))
+
+    def __call__(self, share: float, stage: str | None = None) -> None:
+        """Report that a share of this work is done, 0 to 1; raises what the caller's function raises."""
+        if self._report is not None:
+            self._report(self.stage if stage is None else stage, self._start + share * (self._end - self._start))
+
+    def part(self, start: float, end: float, stage: str | None = None) -> Progress:
+        """The part of this work between two shares of it, under the name of another stage if one is given."""
+        length = self._end - self._start
+        name = self.stage if stage is None else stage
+        return Progress(self._report, name, self._start + start * length, self._start + end * length)
+
+    @contextmanager
+    def step(self, share: float, stage: str | None = None) -> Iterator[Progress]:
+        """The next part of this work, of a share of it; its beginning and its end are reported."""
+        part = self.part(self._begun, self._begun + share, stage)
+        part(0.0)
+        yield part
+        self._begun += share
+        part(1.0)
+
+    def each(self, items: Sequence[T], stage: str | None = None) -> Iterator[tuple[T, Progress]]:
+        """Each of several items with the progress of its equal share of what is left of this work."""
+        begun, share = self._begun, (1.0 - self._begun) / max(len(items), 1)
+        for i, item in enumerate(items):
+            part = self.part(begun + i * share, begun + (i + 1) * share, stage)
+            part(0.0)
+            yield item, part
+            part(1.0)
+        self._begun = 1.0
