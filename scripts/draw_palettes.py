@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from wks_segment.blender.outputs.palette import BLINDNESS, RECIPES, linear, sided_palette
+from wks_segment.blender.parts.palette import BLINDNESS, RECIPES, linear, sided_palette
 from wks_segment.core.mesh.triangle_mesh import FloatArray
 
 COLORS = 16

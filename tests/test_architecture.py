@@ -24,6 +24,7 @@ LAYERS = {
     ],
     "blender": [
         {"errors"},
+        {"parts"},
         {"props"},
         {"scene"},
         {"outputs"},

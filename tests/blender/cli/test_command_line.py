@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from builders import Outcome, labels_of, limbed, limbed_keys, limbed_rigged, mesh_object, numbers, select
 
-from wks_segment.blender.outputs.palette import palette
+from wks_segment.blender.parts.palette import palette
 from wks_segment.core import PoseSegmentation
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -8,7 +8,7 @@ import pytest
 from builders import changes, limbed, mesh_object, numbers, scene_snapshot, select
 
 from wks_segment.blender.outputs.labels import clear_labels, labels_on, write_labels
-from wks_segment.blender.outputs.part_style import Style
+from wks_segment.blender.parts.part_style import Style
 
 pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment

@@ -6,7 +6,7 @@ import pytest
 from builders import changes, coordinates, limbed, mesh_object, numbers, read_labels, snapshot
 
 from wks_segment.blender.outputs.labels import clear_labels, write_labels
-from wks_segment.blender.outputs.palette import palette
+from wks_segment.blender.parts.palette import palette
 
 pytestmark = pytest.mark.usefixtures("scene")
 

@@ -18,8 +18,8 @@ from builders import (
 
 from wks_segment.blender.outputs.labels import clear_labels, labels_on, write_labels
 from wks_segment.blender.outputs.materials import COMPONENT
-from wks_segment.blender.outputs.part_style import Style
 from wks_segment.blender.outputs.seams import borders
+from wks_segment.blender.parts.part_style import Style
 
 pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment

@@ -6,8 +6,8 @@ import pytest
 from builders import changes, limbed_poses, scene_snapshot
 
 from wks_segment.blender.errors import UserError
-from wks_segment.blender.outputs.palette import palette
-from wks_segment.blender.outputs.part_style import Style
+from wks_segment.blender.parts.palette import palette
+from wks_segment.blender.parts.part_style import Style
 from wks_segment.blender.render.contact_sheet import TILE, Tile, render_poses
 from wks_segment.blender.scene import poses as reader
 from wks_segment.blender.scene.poses import Character

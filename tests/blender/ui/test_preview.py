@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from builders import changes, labels_of, limbed_rigged, scene_snapshot, select, snapshot
 
-from wks_segment.blender.outputs.palette import colors_of
+from wks_segment.blender.parts.palette import colors_of
 from wks_segment.blender.ui.preview import DARKEST, OFFSET, picture
 from wks_segment.blender.workflow.live_session import session_of
 

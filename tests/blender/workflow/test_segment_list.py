@@ -22,9 +22,9 @@ from builders import (
 )
 
 from wks_segment.blender import operators
-from wks_segment.blender.outputs import part_ids
 from wks_segment.blender.outputs.overrides import by_hand
-from wks_segment.blender.outputs.palette import palette
+from wks_segment.blender.parts import part_ids
+from wks_segment.blender.parts.palette import palette
 from wks_segment.blender.scene.characters import Character
 from wks_segment.blender.ui import segments_panel
 from wks_segment.blender.workflow import pipeline
@@ -99,7 +99,7 @@ def corners_of(obj, part):
 
 def all_agrees(obj, settings):
     """Colors, materials, groups and the vertices' attribute say what the faces' labels and the list say."""
-    style, found = settings.style(), part_ids.among(labels_of(obj))
+    style, found = settings.style(), part_ids.unique_parts(labels_of(obj))
     for part in found:
         expected = np.rint(255 * style.colors_of(np.array(part)))
         np.testing.assert_allclose(colors_at(obj, part), [expected], atol=1)

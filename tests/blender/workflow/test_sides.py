@@ -8,9 +8,9 @@ from mathutils import Matrix
 
 from wks_segment.blender.cli import creature as builder
 from wks_segment.blender.cli import demo_scene
-from wks_segment.blender.outputs import part_ids
 from wks_segment.blender.outputs.labels import clear_labels, write_labels
-from wks_segment.blender.outputs.palette import sided_palette
+from wks_segment.blender.parts import part_ids
+from wks_segment.blender.parts.palette import sided_palette
 from wks_segment.blender.scene.characters import Character
 
 pytestmark = pytest.mark.usefixtures("scene")
@@ -84,20 +84,20 @@ def sides_are_right(obj, left=1, right=2):
 
 
 def test_parts_are_numbered_by_segment_and_side():
-    numbered = part_ids.numbered(np.array([2, 2, 2, 0, -1]), np.array([0, 1, -1, 1, 0]))
+    numbered = part_ids.from_segments(np.array([2, 2, 2, 0, -1]), np.array([0, 1, -1, 1, 0]))
     assert numbered.tolist() == [2, 1002, 2002, 1000, -1]
     assert part_ids.segments_of(numbered[:4]).tolist() == [2, 2, 2, 0]
     assert part_ids.sides_of(numbered[:4]).tolist() == [0, 1, 2, 1]
-    names = [part_ids.name_of(part) for part in numbered[:4].tolist()]
+    names = [part_ids.default_name(part) for part in numbered[:4].tolist()]
     assert names == ["Segment 3", "Segment 3.L", "Segment 3.R", "Segment 1.L"]
 
 
 def test_blender_takes_the_names_for_those_of_sides():
-    assert bpy.utils.flip_name(part_ids.name_of(1002)) == part_ids.name_of(2002)
+    assert bpy.utils.flip_name(part_ids.default_name(1002)) == part_ids.default_name(2002)
 
 
 def test_parts_are_listed_by_segment():
-    assert part_ids.among(np.array([2001, 1, 2000, 5, 1001, 1])) == [2000, 1, 1001, 2001, 5]
+    assert part_ids.unique_parts(np.array([2001, 1, 2000, 5, 1001, 1])) == [2000, 1, 1001, 2001, 5]
 
 
 # Learn and Segment
@@ -230,7 +230,7 @@ def test_materials_of_a_segment_stand_together_and_meshes_share_them():
     assert [material.name for material in meshes[0].materials] == names
     assert list(meshes[0].materials) == list(meshes[1].materials)
     for polygon, label in zip(meshes[0].polygons, labels.tolist(), strict=True):
-        assert meshes[0].materials[polygon.material_index].name == part_ids.name_of(label)
+        assert meshes[0].materials[polygon.material_index].name == part_ids.default_name(label)
     linear = np.array(bpy.data.materials["Segment 2.L"].diffuse_color[:3])
     srgb = np.where(linear < 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     np.testing.assert_allclose(srgb, sided_palette()[1, 1], atol=1e-3)
@@ -254,13 +254,13 @@ def test_hard_groups_are_of_one_side(learned, settings):
     settings.vertex_groups = "hard"
     OPS.apply()
     groups, labels = ours(learned), labels_of(learned)
-    assert list(groups) == [f"WKS {part_ids.name_of(part)}" for part in part_ids.among(labels)]
+    assert list(groups) == [f"WKS {part_ids.default_name(part)}" for part in part_ids.unique_parts(labels)]
     assert {"WKS Segment 1", "WKS Segment 1.L", "WKS Segment 1.R"} < set(groups)
-    for part in part_ids.among(labels):
+    for part in part_ids.unique_parts(labels):
         corners = [
             polygon.vertices for polygon, label in zip(learned.data.polygons, labels, strict=True) if label == part
         ]
-        members = np.flatnonzero(groups[f"WKS {part_ids.name_of(part)}"])
+        members = np.flatnonzero(groups[f"WKS {part_ids.default_name(part)}"])
         np.testing.assert_array_equal(members, np.unique(np.concatenate(corners)))
 
 

@@ -6,10 +6,10 @@ import bpy
 import numpy as np
 
 from ..errors import UserError
-from ..outputs import part_ids
 from ..outputs.connected_regions import pieces_of
 from ..outputs.overrides import by_hand, keep_by_hand
-from ..outputs.palette import MAX_COLORS
+from ..parts import part_ids
+from ..parts.palette import MAX_COLORS
 from ..scene.characters import group
 from ..scene.poses import polygon_ranges
 from ..workflow import segment_list
@@ -46,7 +46,8 @@ class WKS_SEGMENT_OT_split_segment(bpy.types.Operator):
             _report.tell(self, {"WARNING"}, f"{name} is in one piece on these objects; nothing to split")
             return {"CANCELLED"}
         new = [
-            segment_list.make_part(settings, part_ids.base_of(name), part // part_ids.SIDE) for _ in range(count - 1)
+            segment_list.make_part(settings, part_ids.without_side(name), part // part_ids.SIDE_STEP)
+            for _ in range(count - 1)
         ]
         number = np.array([-1, *new])
         for character, pieces in found.items():

@@ -12,11 +12,11 @@ import numpy as np
 from ...core.mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ...core.poses.describe import Progress
 from ..errors import UserError
+from ..parts.part_style import Style
 from ..scene.characters import Character
 from .id_map import NAME, NOTHING, with_margin, write_id_map
 from .labels import labels_on
 from .ledger import note_of, read_attribute
-from .part_style import Style
 from .uv_maps import project, write_uv_map
 
 ENGINE = "CYCLES"

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from ...core.mesh.triangle_mesh import IntArray
-from . import part_ids
+from ..parts import part_ids
 from .ledger import NOTE, add_attribute, read_attribute
 
 FACE_SETS = ".sculpt_face_set"
@@ -26,7 +26,7 @@ def write_face_sets(mesh: bpy.types.Mesh, labels: IntArray) -> None:
         mesh.attributes.new(FACE_SETS, "INT", "FACE")
     else:
         add_attribute(mesh, "own_face_sets", OWN_FACE_SETS, "INT", "FACE", own)
-    mesh[NOTE]["face_sets"] = [part + FIRST for part in part_ids.among(labels)]
+    mesh[NOTE]["face_sets"] = [part + FIRST for part in part_ids.unique_parts(labels)]
     mesh.attributes[FACE_SETS].data.foreach_set("value", (labels + FIRST).astype(np.int32))
 
 

@@ -11,8 +11,8 @@ from scipy.ndimage import distance_transform_edt
 
 from ...core.mesh.triangle_mesh import IntArray
 from ..errors import UserError
+from ..parts.part_style import Style
 from .ledger import NOTE, note_of, open_note
-from .part_style import Style
 
 NAME = "{} ID Map"
 MARK = "wks_segment_id_map"

@@ -11,11 +11,11 @@ import numpy as np
 
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ..errors import UserError
+from ..parts.part_ids import SIDE_STEP, segments_of
 from ..scene.characters import Character
 from .face_sets import FACE_SETS, FIRST
 from .ledger import note_of, read_attribute
 from .materials import COMPONENT
-from .part_ids import SIDE, segments_of
 from .vertex_groups import group_weights, our_groups
 
 FACE_SET, MATERIAL, GROUP = "FACE_SETS", "MATERIALS", "VERTEX_GROUPS"
@@ -54,13 +54,13 @@ def corrected_parts(character: Character, source: str) -> dict[Hashable, int]:
     found = [_find(obj, source) for obj in character.objects]
     parts = {key: part for of in found for key, part in of.ours.items()}
     taken = set(segments_of(np.array(list(parts.values()), dtype=np.int64)).tolist())
-    free = iter([segment for segment in range(SIDE) if segment not in taken])
+    free = iter([segment for segment in range(SIDE_STEP) if segment not in taken])
     for of in found:
         for i in np.unique(of.index).tolist():
             if of.keys[i] not in parts:
                 part = next(free, None)
                 if part is None:
-                    raise UserError(f'"{character.name}" has more than {SIDE} of them: too many for segments')
+                    raise UserError(f'"{character.name}" has more than {SIDE_STEP} of them: too many for segments')
                 parts[of.keys[i]] = part
     return parts
 

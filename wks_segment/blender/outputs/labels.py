@@ -9,11 +9,11 @@ import bpy
 import numpy as np
 
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
+from ..parts.part_style import PLAIN, Style
 from .face_sets import remove_face_sets, write_face_sets
 from .id_map import remove_id_map
 from .ledger import NOTE, add_attribute, has_note, note_of, read_ints
 from .materials import remove_materials, write_materials
-from .part_style import PLAIN, Style
 from .seams import remove_seams, write_seams
 from .uv_maps import remove_uv_map
 from .vertex_groups import active_group, free_name, remove_groups, write_groups

@@ -8,10 +8,10 @@ import bpy
 import numpy as np
 
 from ...core.mesh.triangle_mesh import IntArray
-from . import part_ids
+from ..parts import part_ids
+from ..parts.palette import linear
+from ..parts.part_style import Style
 from .ledger import NOTE, add_attribute, note_of, read_attribute
-from .palette import linear
-from .part_style import Style
 
 OWN_MATERIALS = "wks_segment_own_material"
 """Face attribute that keeps the material index of each face from before ours."""
@@ -31,7 +31,7 @@ def write_materials(
     mesh.polygons.foreach_get("material_index", before)
     add_attribute(mesh, "own_materials", OWN_MATERIALS, "INT", "FACE", before)
     slot = np.zeros(int(labels.max()) + 1, dtype=np.int32)
-    for part in part_ids.among(labels):
+    for part in part_ids.unique_parts(labels):
         slot[part] = len(mesh.materials)
         mesh.materials.append(_material(part, style, template))
     mesh[NOTE]["last_slot"] = len(mesh.materials)

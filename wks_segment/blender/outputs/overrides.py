@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
-from . import part_ids
+from ..parts import part_ids
+from ..parts.part_style import Style
 from .labels import labels_on, write_labels
 from .ledger import NOTE, add_attribute, note_of, read_ints
 from .materials import COMPONENT, template_of
-from .part_style import Style
 from .vertex_groups import read_groups
 from .vertex_weights import hard_weights
 
@@ -110,7 +110,7 @@ def moved(
     vertices, centers = values(mesh.vertices, "co", np.float32, 3), values(mesh.polygons, "center", np.float32, 3)
     for part, of_part in weights.items():
         mine = np.flatnonzero(before == part)
-        found = part_ids.among(after[mine]) or [part]
+        found = part_ids.unique_parts(after[mine]) or [part]
         nearest = np.full(len(vertices), found[0])
         if len(found) > 1:
             nearest = after[mine[cKDTree(centers[mine]).query(vertices)[1]]]

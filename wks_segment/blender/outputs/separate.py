@@ -12,9 +12,9 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...core.mesh.triangle_mesh import BoolArray, IntArray
-from . import part_ids
+from ..parts import part_ids
+from ..parts.part_style import Style
 from .ledger import NOTE
-from .part_style import Style
 from .vertex_groups import group_weights
 
 PIECE = "wks_segment_piece"
@@ -32,7 +32,7 @@ def separate(
     materials, vertex groups, shape keys and UV maps.
     """
     pieces = []
-    for part in part_ids.among(labels):
+    for part in part_ids.unique_parts(labels):
         mesh = _only(obj.data, labels == part)
         mesh.name = style.name_of(part)
         piece = obj.copy()

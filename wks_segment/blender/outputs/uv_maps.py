@@ -14,7 +14,7 @@ from mathutils.geometry import box_pack_2d
 
 from ...core.mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ..errors import UserError
-from . import part_ids
+from ..parts import part_ids
 from .ledger import NOTE, note_of, open_note, read_attribute
 from .seams import borders
 from .vertex_groups import free_name
@@ -83,7 +83,7 @@ def unwrap_parts(context: bpy.types.Context, mesh: bpy.types.Mesh, labels: IntAr
         copy.edges.foreach_get("use_seam", seams)
         copy.edges.foreach_set("use_seam", seams | borders(copy, part_of))
         corners = np.repeat(part_of, _corners(copy))
-        found, boxes = part_ids.among(part_of), []
+        found, boxes = part_ids.unique_parts(part_of), []
         for part in found if method == SMART else []:
             _project(copy, part_of == part)
         everything = np.ones(len(part_of), dtype=bool)

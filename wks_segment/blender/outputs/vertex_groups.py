@@ -11,8 +11,8 @@ import bpy
 import numpy as np
 
 from ...core.mesh.triangle_mesh import FloatArray
-from . import part_ids
-from .part_style import Style
+from ..parts import part_ids
+from ..parts.part_style import Style
 
 NAME = "WKS {}"
 """Not the bare name of our materials: bones, attributes and vertex groups share their names."""
@@ -35,7 +35,9 @@ def write_groups(
     with _holder(mesh) as holder:
         active = holder.vertex_groups.active
         note["active_group"] = active.name if active is not None else ""
-        found = part_ids.among(np.array([part for part, of_part in weights.items() if of_part.any()], dtype=np.int64))
+        found = part_ids.unique_parts(
+            np.array([part for part, of_part in weights.items() if of_part.any()], dtype=np.int64)
+        )
         names = [NAME.format(style.name_of(part)) for part in found]
         groups = [holder.vertex_groups.new(name=_free_name(holder, name)) for name in names]
         note["own_groups"] = [group.name for group in holder.vertex_groups if group not in groups]

@@ -12,9 +12,9 @@ from scipy.spatial import cKDTree
 from ...core import PoseSegmentation, Workpiece
 from ...core.mesh.surface import indicator
 from ...core.mesh.triangle_mesh import BoolArray, FloatArray, IntArray
+from ..parts import part_ids
 from ..scene.mesh_arrays import Body, corners_of
 from ..scene.poses import Pose
-from . import part_ids
 
 LEAST = 0.01
 """Smaller soft weights are left out: nearly every vertex would be in every group."""
@@ -24,7 +24,7 @@ def hard_weights(mesh: bpy.types.Mesh, labels: IntArray) -> dict[int, FloatArray
     """For each part (n,) 1 where a vertex is a corner of a polygon of it, else 0; given the (p,) parts of polygons."""
     vertices, polygons = corners_of(mesh)
     of_corner = labels[polygons]
-    weights = {part: np.zeros(len(mesh.vertices)) for part in part_ids.among(labels)}
+    weights = {part: np.zeros(len(mesh.vertices)) for part in part_ids.unique_parts(labels)}
     for part, of_part in weights.items():
         of_part[vertices[of_corner == part]] = 1.0
     return weights
@@ -70,7 +70,7 @@ def by_parts(weights: FloatArray, labels: IntArray, body: Body) -> dict[int, Flo
     result: dict[int, FloatArray] = {}
     for segment in np.flatnonzero(weights.any(axis=0)).tolist():
         mine = np.flatnonzero(part_ids.segments_of(labels) == segment)
-        found = part_ids.among(labels[mine]) or [segment]
+        found = part_ids.unique_parts(labels[mine]) or [segment]
         nearest = np.full(len(vertices), found[0])
         if len(found) > 1:
             nearest = labels[mine[cKDTree(polygons[mine]).query(vertices)[1]]]

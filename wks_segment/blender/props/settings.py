@@ -18,8 +18,8 @@ from bpy.props import (
 
 from ...core import PartNotes, PoseSegmentation
 from ..errors import UserError
-from ..outputs.palette import DEFAULT, MAX_COLORS, RECIPES
-from ..outputs.part_style import Style
+from ..parts.palette import DEFAULT_PALETTE, MAX_COLORS, RECIPES
+from ..parts.part_style import Style
 from ..workflow.live_session import session_of
 from ..workflow.model_library import followed
 from .model_item import WKSModelItem, WKSRankItem
@@ -247,7 +247,7 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         name="Palette",
         description="Which colors the segments have",
         items=[(name, recipe.title, recipe.description) for name, recipe in RECIPES.items()],
-        default=DEFAULT,
+        default=DEFAULT_PALETTE,
     )
 
     vertex_groups: EnumProperty(

@@ -16,7 +16,7 @@ from mathutils import Matrix, Vector
 
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ..errors import UserError
-from ..outputs.part_style import PLAIN, Style
+from ..parts.part_style import PLAIN, Style
 from ..scene.poses import Pose
 
 TILE = 480

@@ -12,7 +12,7 @@ from gpu_extras.batch import batch_for_shader
 
 from ...core.mesh.surface import indicator
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
-from ..outputs.part_style import PLAIN, Style
+from ..parts.part_style import PLAIN, Style
 from ..scene import poses as reader
 from ..scene.characters import Character
 

@@ -28,10 +28,10 @@ from ...core.poses.describe import Progress
 from ...core.segmentation import DESCRIBED
 from ...core.spectral.memory import available_memory
 from ..errors import TooLargeError, UserError
-from ..outputs import part_ids
 from ..outputs.overrides import write_edited
-from ..outputs.part_style import Style
 from ..outputs.vertex_weights import by_parts, soft_weights
+from ..parts import part_ids
+from ..parts.part_style import Style
 from ..props.settings import WKSSegmentSettings
 from ..scene import poses as reader
 from ..scene.characters import Character
@@ -214,7 +214,7 @@ def label(
                         f'Left and right of "{name}"', (number + cut + (1 - cut) * share) / len(together)
                     ),
                 )
-                found = part_ids.numbered(found, sides)
+                found = part_ids.from_segments(found, sides)
             found = filled(found, body)
             labels |= {poses[i].character: found for i in mine}
     report.tell_of_parts(np.concatenate(list(labels.values())))
@@ -286,7 +286,7 @@ def write(
                 )  # fmt: skip
                 written.append(final)
         segment_list.fill(settings)
-    report.parts = {style.name_of(part): part for part in part_ids.among(np.concatenate(written))}
+    report.parts = {style.name_of(part): part for part in part_ids.unique_parts(np.concatenate(written))}
 
 
 def stored_model(settings: WKSSegmentSettings) -> PoseSegmentation:

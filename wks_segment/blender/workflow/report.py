@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core import PoseSegmentation
 from ...core.mesh.triangle_mesh import IntArray
-from ..outputs import part_ids
+from ..parts import part_ids
 from ..scene.poses import Pose
 from .certainty import certainties, certainty_lines
 
@@ -36,9 +36,9 @@ class Report:
 
     def tell_of_parts(self, labels: IntArray) -> None:
         """Say which parts there are among labels."""
-        occurring = part_ids.among(labels)
+        occurring = part_ids.unique_parts(labels)
         self.n_segments = len(np.unique(part_ids.segments_of(np.array(occurring))))
-        self.parts = {part_ids.name_of(part): part for part in occurring}
+        self.parts = {part_ids.default_name(part): part for part in occurring}
 
     def warn(self, text: str) -> None:
         """Warn of something, once."""
@@ -57,7 +57,7 @@ class Report:
         return [
             "1 pose" if len(self.poses) == 1 else f"{len(self.poses)} poses",
             f"{sum(pose.mesh.n_vertices for pose in self.poses):,} vertices",
-            part_ids.counted(self.n_segments, len(self.parts)),
+            part_ids.count_text(self.n_segments, len(self.parts)),
             *([f"better triangles for {improved}"] if (improved := self.laplacians.count("delaunay")) else []),
             f"{sum(self.seconds.values()):.1f} seconds",
         ]

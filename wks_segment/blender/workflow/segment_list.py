@@ -13,14 +13,14 @@ import numpy as np
 from ...core import PartNotes
 from ...core.mesh.triangle_mesh import IntArray
 from ...core.user_labels import LONGEST_NAME
-from ..outputs import part_ids
 from ..outputs.labels import has_labels, labels_on
 from ..outputs.ledger import NOTE, note_of
 from ..outputs.materials import COMPONENT, recolor_material
 from ..outputs.overrides import by_hand, keep_by_hand, model_labels, rewrite, values
-from ..outputs.palette import most_different
-from ..outputs.part_style import Style
 from ..outputs.vertex_groups import rename_group
+from ..parts import part_ids
+from ..parts.palette import most_different
+from ..parts.part_style import Style
 from ..scene.characters import Character, mesh_objects, with_rigged
 from ..scene.poses import polygon_ranges
 
@@ -72,7 +72,7 @@ def fill(settings: WKSSegmentSettings) -> None:
         settings.faces_by_hand += int((by_hand(obj.data) >= 0).sum())
     total = sum(area.values()) or 1.0
     settings.segments.clear()
-    for part in part_ids.among(np.array(list(area), dtype=np.int64)):
+    for part in part_ids.unique_parts(np.array(list(area), dtype=np.int64)):
         item = settings.segments.add()
         item.number, item.share, item.hidden = part, 100 * area[part] / total, not seen[part]
         if part == active:
@@ -119,7 +119,7 @@ def rename(settings: WKSSegmentSettings, part: int, name: str) -> None:
             sibling: _suffixed(base, sibling, f"{'.' if base[-1].isdigit() else ' '}{repeated}") for sibling in siblings
         }
     others = {number: other for number, other in notes.names.items() if number not in siblings}
-    names = {sibling: new for sibling, new in wanted.items() if base and new != part_ids.name_of(sibling)}
+    names = {sibling: new for sibling, new in wanted.items() if base and new != part_ids.default_name(sibling)}
     settings.keep_notes(replace(notes, names=others | names))
     for sibling in siblings:
         restyle(settings, sibling, color=False)
@@ -156,7 +156,7 @@ def make_part(settings: WKSSegmentSettings, name: str, side: int = 0) -> int:
     for mesh in meshes_of(labeled(settings, everywhere=True)):
         taken |= set(np.unique(by_hand(mesh)).tolist())
     taken.discard(-1)
-    part = part_ids.new_part(taken, side)
+    part = part_ids.free_part(taken, side)
     used = {item.number for item in settings.segments} | notes.colors.keys()
     color = most_different(style.colors_of(np.array(sorted(used), dtype=np.int64)))
     red, green, blue = color.tolist()
@@ -174,7 +174,7 @@ def carry_over(settings: WKSSegmentSettings, labels: Mapping[Character, IntArray
     notes, style = settings.notes(), settings.style()
     given = {mesh: by_hand(mesh) for mesh in meshes_of(labeled(settings, everywhere=True))}
     present = {part for found in given.values() for part in np.unique(found[found >= 0]).tolist()}
-    new = _successors(labels) | {part: part for part in present if part % part_ids.SIDE >= part_ids.MADE}
+    new = _successors(labels) | {part: part for part in present if part % part_ids.SIDE_STEP >= part_ids.FIRST_MADE}
     settings.keep_notes(
         PartNotes(
             {new[part]: name for part, name in notes.names.items() if part in new},
@@ -183,7 +183,7 @@ def carry_over(settings: WKSSegmentSettings, labels: Mapping[Character, IntArray
         )
     )
     for part in sorted(present - new.keys()):
-        new[part] = make_part(settings, style.name_of(part), part // part_ids.SIDE)
+        new[part] = make_part(settings, style.name_of(part), part // part_ids.SIDE_STEP)
     for mesh, found in given.items():
         if (found >= 0).any():
             keep_by_hand(mesh, np.array([new.get(part, -1) for part in found.tolist()]))
@@ -232,8 +232,8 @@ def object_mode(context: bpy.types.Context) -> Iterator[None]:
 
 def _suffixed(base: str, part: int, number: str = "") -> str:
     """A name with the suffix of the part's side behind the number, not too long."""
-    suffix = part_ids.SUFFIXES[part // part_ids.SIDE]
-    base = part_ids.base_of(base) if suffix else base
+    suffix = part_ids.SIDE_SUFFIXES[part // part_ids.SIDE_STEP]
+    base = part_ids.without_side(base) if suffix else base
     return base[: LONGEST_NAME - len(number) - len(suffix)].rstrip() + number + suffix
 
 

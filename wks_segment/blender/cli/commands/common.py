@@ -12,8 +12,8 @@ import bpy
 from ....core import DiskCache, PartNotes, PoseSegmentation
 from ....core.poses.describe import Progress
 from ...errors import UserError
-from ...outputs import part_ids
 from ...outputs.overrides import merged
+from ...parts import part_ids
 from ...props.settings import WKSSegmentSettings
 from ...render.contact_sheet import Tile, render_poses
 from ...scene import file_formats
@@ -215,7 +215,7 @@ def text_of(result: dict[str, Any]) -> str:
         for pose in result["poses"]
     ]
     stages = [[name, f"{seconds:.1f}"] for name, seconds in result["seconds"].items()]
-    found = part_ids.counted(result["segments"], len(result.get("parts", {})))
+    found = part_ids.count_text(result["segments"], len(result.get("parts", {})))
     lines = [table(header, rows), "", table(["stage", "seconds"], stages), "", found]
     if with_agreement:
         lines.append(f"agreement of unseen poses: {result['agreement']:.3f} of the area has the learned label")

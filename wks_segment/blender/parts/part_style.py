@@ -10,7 +10,7 @@ import numpy as np
 from ...core import PartNotes
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from . import part_ids
-from .palette import DEFAULT, colors_of
+from .palette import DEFAULT_PALETTE, colors_of
 
 
 @dataclass(frozen=True)
@@ -29,16 +29,16 @@ class Style:
 
     names: Mapping[int, str] = field(default_factory=dict)
     colors: Mapping[int, FloatArray] = field(default_factory=dict)
-    palette: str = DEFAULT
+    palette: str = DEFAULT_PALETTE
 
     @classmethod
-    def of(cls, notes: PartNotes, of_others: str = DEFAULT) -> Style:
+    def of(cls, notes: PartNotes, of_others: str = DEFAULT_PALETTE) -> Style:
         """As a user has noted it, and the palette for other parts."""
         return cls(notes.names, {part: np.array(color) for part, color in notes.colors.items()}, of_others)
 
     def name_of(self, part: int) -> str:
         """As a person reads it."""
-        return self.names.get(part) or part_ids.name_of(part)
+        return self.names.get(part) or part_ids.default_name(part)
 
     def colors_of(self, numbers: IntArray) -> FloatArray:
         """(…, 3) sRGB color of each part, given (…) numbers."""

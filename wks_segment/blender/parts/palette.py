@@ -18,9 +18,9 @@ LIGHTNESS = (0.50, 0.86)
 """Range of lightness in OKLab, 0 black to 1 white: shading must stay readable on every color."""
 CHROMA = (0.085, 0.18)
 """Range of the distance from gray in OKLab: gray is what an object without segments looks like, neon tires the eye."""
-FIRST = (0.86, 0.34, 0.28)
+FIRST_COLOR = (0.86, 0.34, 0.28)
 """The color to start from, a warm red."""
-LEFT, RIGHT = (0.70, 0.92), (0.44, 0.60)
+LEFT_LIGHTNESS, RIGHT_LIGHTNESS = (0.70, 0.92), (0.44, 0.60)
 """The same range of lightness for parts on the left and on the right, which are told apart by it …"""
 SIDED_CHROMA = (0.06, 0.30)
 SIDED_HUE = radians(35)
@@ -63,8 +63,8 @@ class Recipe:
     description: str
     lightness: tuple[float, float]
     chroma: tuple[float, float]
-    left: tuple[float, float] = LEFT
-    right: tuple[float, float] = RIGHT
+    left: tuple[float, float] = LEFT_LIGHTNESS
+    right: tuple[float, float] = RIGHT_LIGHTNESS
     sided_hue: float = SIDED_HUE
     color_blind: bool = False
 
@@ -73,9 +73,9 @@ class Recipe:
         return np.stack([_lab_of_linear(linear(srgb) @ eye.T) for eye in _BY_ALL[: 4 if self.color_blind else 1]])
 
 
-DEFAULT = "calm"
+DEFAULT_PALETTE = "calm"
 RECIPES = {
-    DEFAULT: Recipe(
+    DEFAULT_PALETTE: Recipe(
         "Calm", "Clearly different and easy on the eye: shading stays readable on all of them", LIGHTNESS, CHROMA
     ),
     "maximal": Recipe(
@@ -90,13 +90,13 @@ RECIPES = {
 
 
 @cache
-def palette(name: str = DEFAULT) -> FloatArray:
+def palette(name: str = DEFAULT_PALETTE) -> FloatArray:
     """(MAX_COLORS, 3) sRGB colors, 0 to 1: each as far as possible, to the eye, from all before it."""
     recipe = RECIPES[name]
     candidates, lab = _candidates()
     candidates = candidates[_within(lab, recipe.lightness, recipe.chroma)]
     seen = recipe.seen(candidates)
-    chosen = [np.array(FIRST)]
+    chosen = [np.array(FIRST_COLOR)]
     nearest = _distance(seen, recipe.seen(chosen[0]))
     while len(chosen) < MAX_COLORS:
         farthest = int(np.argmax(nearest))
@@ -108,7 +108,7 @@ def palette(name: str = DEFAULT) -> FloatArray:
 
 
 @cache
-def sided_palette(name: str = DEFAULT) -> FloatArray:
+def sided_palette(name: str = DEFAULT_PALETTE) -> FloatArray:
     """(3, MAX_COLORS, 3) sRGB colors of the parts in the middle, which are those of the palette, left and right.
 
     Each as far as possible, to the eye, from all of the palette and from all sides before it.
@@ -155,7 +155,7 @@ def _hue(lab: FloatArray) -> FloatArray:
     return np.arctan2(lab[:, 2], lab[:, 1])
 
 
-def colors_of(parts: IntArray, name: str = DEFAULT) -> FloatArray:
+def colors_of(parts: IntArray, name: str = DEFAULT_PALETTE) -> FloatArray:
     """(…, 3) sRGB color of each part in a palette; they repeat after MAX_COLORS segments."""
     return sided_palette(name)[sides_of(parts), segments_of(parts) % MAX_COLORS]
 

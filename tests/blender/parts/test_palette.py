@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from wks_segment.blender.outputs import palette as module
-from wks_segment.blender.outputs.palette import MAX_COLORS, colors_of, oklab, palette, sided_palette
+from wks_segment.blender.parts import palette as module
+from wks_segment.blender.parts.palette import MAX_COLORS, colors_of, oklab, palette, sided_palette
 
 
 def test_first_colors_do_not_depend_on_how_many_there_are(monkeypatch):

@@ -1,0 +1,1 @@
+"""Numbers, names and colors of parts, as they are shown and written; needs no Blender."""
