@@ -4,8 +4,8 @@
 
 - `model.json`: learned from three poses of a ball with three limbs, with four segments;
 - `labeled.blend`: the three poses with colors, materials, face sets, seams and soft vertex groups; the first one with
-  twelve faces assigned by hand, a renamed and a recolored segment, and materials, a color attribute, face sets, seams, a
-  UV map, a vertex group and properties of the artist's; the third one separated into objects;
+  twelve faces assigned by hand, a renamed and a recolored segment, and with materials, a color attribute, face sets,
+  seams, a UV map, a vertex group and properties of the artist's; the third one separated into objects;
 - `expected.json`: the state of each object before anything was written to it, and the labels that were written.
 """
 
