@@ -8,6 +8,7 @@ whoever shows it looks the template up and fills it in again.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 
 
 class Message(str):
@@ -37,13 +38,21 @@ class Message(str):
         return cls(separator.join(f"{{{name}}}" for name in values), **values)
 
     def translated(self, lookup: Callable[[str], str]) -> str:
-        """The text in another language, given a function from a template to the same template in that language."""
-        template = lookup(self.template)
+        """The text in another language, given a function from a template to the same template in that language.
+
+        A template that the function does not know stays English. So does one whose translation cannot be filled in: a
+        translator's mistake must not stop the interface.
+        """
+        if not self.values:
+            return lookup(self.template)
         values = {
             name: value.translated(lookup) if isinstance(value, Message) else value
             for name, value in self.values.items()
         }
-        return template.format(**values) if values else template
+        for template in (lookup(self.template), self.template):
+            with suppress(LookupError, ValueError, TypeError, AttributeError):
+                return template.format(**values)
+        return str(self)
 
 
 def message_of(error: BaseException) -> str:
