@@ -4,7 +4,8 @@ import bpy
 import pytest
 
 from wks_segment.blender import registration
-from wks_segment.blender.ui.translations import GERMAN, GERMAN_OPERATORS, MESSAGE, NAME, OPERATOR, TRANSLATIONS
+from wks_segment.blender.ui.german.interface import GERMAN_INTERFACE, GERMAN_OPERATORS
+from wks_segment.blender.ui.translations import MESSAGE, NAME, OPERATOR, TRANSLATIONS
 
 pytestmark = pytest.mark.usefixtures("scene")
 BLENDERS = {"", "Name", "Number", "Color", "Unique name used in the code and scripting", "File Path", "Path to file"}
@@ -54,7 +55,7 @@ def test_all_that_is_shown_has_a_german_text(extension):
 
 
 def test_texts_are_german_and_without_a_full_stop():
-    for english, german in (GERMAN | GERMAN_OPERATORS).items():
+    for english, german in (GERMAN_INTERFACE | GERMAN_OPERATORS).items():
         assert german.strip() == german != ""
         assert not german.endswith("."), german
         # What is the same in both languages is a name.

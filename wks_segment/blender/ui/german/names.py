@@ -1,0 +1,31 @@
+"""Names of parts of a body in German, by the English name."""
+
+GERMAN_NAMES = {
+    "Human": "Mensch",
+    "Head": "Kopf",
+    "Hair": "Haare",
+    "Neck": "Hals",
+    "Torso": "Rumpf",
+    "Hips": "Hüfte",
+    "Arm": "Arm",
+    "Upper Arm": "Oberarm",
+    "Forearm": "Unterarm",
+    "Hand": "Hand",
+    "Leg": "Bein",
+    "Thigh": "Oberschenkel",
+    "Shin": "Unterschenkel",
+    "Foot": "Fuß",
+    "Clothes": "Kleidung",
+    "Quadruped": "Vierbeiner",
+    "Muzzle": "Schnauze",
+    "Ear": "Ohr",
+    "Tail": "Schwanz",
+    "Tail Tip": "Schwanzspitze",
+    "Foreleg": "Vorderbein",
+    "Hind Leg": "Hinterbein",
+    "Paw": "Pfote",
+    "Forepaw": "Vorderpfote",
+    "Hind Paw": "Hinterpfote",
+    "Mane": "Mähne",
+}
+"""Names for segments to choose from."""
