@@ -1,49 +1,81 @@
-"""Every message with which the code refuses stands in docs/refusals.md, with its reason and what to do."""
+"""Calls that cannot be right are refused, and the message names the argument."""
 
-import ast
-import re
-from pathlib import Path
-
+import numpy as np
 import pytest
+from shapes import creature, grid, icosphere
 
-ROOT = Path(__file__).resolve().parents[2]
-PAGE = (ROOT / "docs" / "refusals.md").read_text(encoding="utf-8").splitlines()
-REFUSALS = {
-    "UserError", "TooLargeError", "ChangedError", "ValueError", "TypeError", "PermissionError", "MemoryError",
-    "SpectrumError", "ModelFileError", "BatchError", "ArgumentTypeError",
-}  # fmt: skip
-"""What is called with a message for the user."""
+from wks_segment.core import (
+    PoseSegmentation,
+    TriangleMesh,
+    eigenpairs,
+    fit_mixture,
+    heat_kernel_signature,
+    prepare_surface,
+    rank,
+    wave_kernel_signature,
+)
+from wks_segment.core.message import message_of
 
-
-def literals(node):
-    """The parts of a message that do not change, in order."""
-    if isinstance(node, ast.Constant) and isinstance(node.value, str):
-        return [node.value]
-    if isinstance(node, ast.JoinedStr):
-        return [part.value for part in node.values if isinstance(part, ast.Constant)]
-    return []
-
-
-def messages():
-    for path in sorted((ROOT / "wks_segment").rglob("*.py")):
-        for call in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if not isinstance(call, ast.Call) or not call.args:
-                continue
-            name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
-            if name == "explain" or (name == "tell" and "INFO" not in ast.dump(call.args[1])):
-                parts = literals(call.args[-1])  # what an operator tells, and why a button is gray
-            else:
-                parts = literals(call.args[0]) if name in REFUSALS else []
-            # What only puts a name before the message of another error says nothing of its own.
-            if len(re.findall("[A-Za-z]{2,}", " ".join(parts))) > 1:
-                yield pytest.param(parts, id=f"{path.stem}:{call.lineno}")
+MESH = grid(4, 4)
+SAMPLES = np.repeat([[0.0], [1.0], [2.0]], 4, axis=0)
 
 
-@pytest.mark.parametrize("parts", messages())
-def test_message_is_explained(parts):
-    message = re.compile(".*".join(re.escape(part.strip()) for part in parts))
-    assert any(message.search(line) for line in PAGE), f"add to docs/refusals.md: {'…'.join(parts)}"
+def model(**parameters):
+    return PoseSegmentation(**{"n_segments": 2, "n_eigenpairs": 12, "n_energies": 8} | parameters)
 
 
-def test_messages_are_found():
-    assert len(list(messages())) > 80
+@pytest.fixture(scope="module")
+def fitted():
+    return model(preset="paper").fit([creature(subdivisions=2)])
+
+
+WRONG = {
+    "vertices: 2 columns": lambda: TriangleMesh([[0, 0]], [[0, 0, 0]]),
+    "vertex 1: not finite": lambda: TriangleMesh([[0, 0, 0], [np.nan, 0, 0], [0, 1, 0]], [[0, 1, 2]]),
+    "faces: 2 columns": lambda: TriangleMesh(MESH.vertices, [[0, 1]]),
+    "faces: no integers": lambda: TriangleMesh(MESH.vertices, [[0.5, 1, 2]]),
+    "faces: none": lambda: TriangleMesh(MESH.vertices, np.zeros((0, 3), int)),
+    "face 0: a vertex twice": lambda: TriangleMesh(MESH.vertices, [[1, 1, 2]]),
+    "face 0: no such vertex": lambda: TriangleMesh(MESH.vertices, [[0, 1, 999]]),
+    "lengths: negative": lambda: TriangleMesh(MESH.vertices, MESH.faces, lengths=-np.ones((MESH.n_faces, 3))),
+    "laplacian: unknown": lambda: prepare_surface(MESH, laplacian="graph"),
+    "n_pairs: 0": lambda: eigenpairs(MESH, 0),
+    "accuracy: unknown": lambda: eigenpairs(MESH, 5, accuracy="best"),
+    "n_energies: 1": lambda: wave_kernel_signature(np.arange(4.0), np.ones((3, 4)), 1),
+    "values: other shape": lambda: wave_kernel_signature(np.arange(4.0), np.ones((3, 5)), 8),
+    "functions: other shape": lambda: heat_kernel_signature(np.arange(4.0), np.ones((3, 5)), 8),
+    "covariance_type: unknown": lambda: fit_mixture(SAMPLES, np.ones(12), 2, "round", 0),
+    "components: too many": lambda: fit_mixture(SAMPLES, np.ones(12), 5, "diag"),
+    "pose: none": lambda: model().fit([]),
+    "pose: a list": lambda: model().fit([[1, 2, 3]]),
+    "n_segments: 0": lambda: model(n_segments=0).fit([MESH]),
+    "n_segments: more than vertices": lambda: model(n_segments=999, preset="paper").fit([MESH]),
+    "n_segments: auto with the paper": lambda: model(n_segments="auto", preset="paper").fit([MESH]),
+    "n_eigenpairs: a text": lambda: model(n_eigenpairs="many").fit([MESH]),
+    "smoothness: too large": lambda: model(smoothness=1e9).fit([MESH]),
+    "pieces: unknown": lambda: model(pieces="apart").fit([MESH]),
+    "rest: other faces": lambda: model().fit([creature(subdivisions=2)], rest=icosphere(1)),
+    "models: none": lambda: rank([], []),
+}
+"""What is named in the message, and a call that must raise it."""
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_the_argument_is_named(case):
+    with pytest.raises((ValueError, TypeError)) as caught:
+        WRONG[case]()
+    assert case.partition(":")[0] in message_of(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("case", "call"),
+    {
+        "min_share": lambda model, mesh: model.segment_faces(mesh, min_share=1.5),
+        "segment": lambda model, mesh: model.with_segments(3),
+        "eigenpairs": lambda model, mesh: model.predict(PoseSegmentation(2, n_eigenpairs=9).describe(mesh)),
+        "polygons": lambda model, mesh: model.segment_polygons([mesh], []),
+    }.items(),
+)
+def test_so_it_is_with_a_fitted_model(fitted, case, call):
+    with pytest.raises(ValueError, match=case):
+        call(fitted, creature(subdivisions=2))
