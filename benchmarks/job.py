@@ -75,7 +75,7 @@ def run() -> dict[str, dict[str, float]]:
         pass
 
     model = settings.new_model()
-    poses = timed("read", lambda: read_training_poses(bpy.context, settings, report))
+    poses = timed("read", lambda: read_training_poses(bpy.context, settings))
     described = timed("connect, eigenpairs, signature", lambda: pipeline.describe(model, poses, report, quiet))
     timed("mixture", lambda: model.fit(described))
     wanted = timed("read meshes", lambda: Wanted.of(settings, (pose.character for pose in poses)))

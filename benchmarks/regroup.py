@@ -56,7 +56,7 @@ def agreements(path: Path) -> list[float]:
     for obj in objects:
         obj.select_set(obj.type == "MESH")
     settings, report = bpy.context.scene.wks_segment, Report([])
-    poses = read_training_poses(bpy.context, settings, report)
+    poses = read_training_poses(bpy.context, settings)
     polygons, rest = [pose.polygon_of for pose in poses], poses[0].upright
     eight = settings.new_model()
     described = pipeline.describe(eight, poses, report, lambda stage, share: None)

@@ -118,3 +118,12 @@ def test_no_pickle_eval_or_swallowed_error():
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
                 assert node.func.id not in {"eval", "exec"}, f"{path}:{node.lineno}"
         assert not {target[0] for target, _ in imports(path)} & {"pickle", "shelve", "marshal"}, path
+
+
+def test_one_module_reads_and_writes_arrays_of_blender():
+    """`foreach_get` and `foreach_set` are fast only with an array of the property's type, which the wrappers give."""
+    for path in (PACKAGE / "blender").rglob("*.py"):
+        if path.relative_to(PACKAGE).as_posix() != "blender/scene/attributes.py":
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.Attribute):
+                    assert node.attr not in {"foreach_get", "foreach_set"}, f"{path}:{node.lineno}"

@@ -18,8 +18,8 @@ from builders import (
 
 from wks_segment.blender.outputs.labels import clear_labels, labels_on, write_labels
 from wks_segment.blender.outputs.materials import COMPONENT
-from wks_segment.blender.outputs.seams import borders
 from wks_segment.blender.parts.part_style import Style
+from wks_segment.blender.scene.topology import border_edges
 
 pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
@@ -555,9 +555,9 @@ def test_transfer_needs_labels_on_the_active_object(settings):
 
 def test_borders_of_labels():
     mesh = mesh_object([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2), (0, 2, 3)]).data
-    found = {edge.key for edge, border in zip(mesh.edges, borders(mesh, np.array([4, 2])), strict=True) if border}
+    found = {edge.key for edge, border in zip(mesh.edges, border_edges(mesh, np.array([4, 2])), strict=True) if border}
     assert found == {(0, 2)}
-    assert not borders(mesh, np.array([1, 1])).any()
+    assert not border_edges(mesh, np.array([1, 1])).any()
     assert labels_on(mesh) is None
 
 

@@ -6,7 +6,8 @@ import bpy
 import numpy as np
 from bpy.props import StringProperty
 
-from ..outputs.overrides import by_hand, keep_by_hand, values
+from ..outputs.overrides import by_hand, keep_by_hand
+from ..scene.attributes import read_bools
 from ..workflow import segment_list
 from . import _report
 
@@ -68,7 +69,7 @@ class WKS_SEGMENT_OT_forget_faces(bpy.types.Operator):
         with segment_list.object_mode(context):
             for mesh in segment_list.meshes_of(objects):
                 given = by_hand(mesh)
-                forgotten = (given >= 0) & (values(mesh.polygons, "select", bool) | (not chosen_only))
+                forgotten = (given >= 0) & (read_bools(mesh.polygons, "select") | (not chosen_only))
                 count += int(forgotten.sum())
                 keep_by_hand(mesh, np.where(forgotten, -1, given))
             segment_list.rewrite_all(settings, objects)
@@ -82,7 +83,7 @@ def _assign(operator: bpy.types.Operator, context: bpy.types.Context, part: int 
     # Faces of objects that are not in Edit Mode can be selected too, unseen.
     objects = [obj for obj in segment_list.labeled(settings) if obj.mode == "EDIT"]
     with segment_list.object_mode(context):
-        chosen = {mesh: values(mesh.polygons, "select", bool) for mesh in segment_list.meshes_of(objects)}
+        chosen = {mesh: read_bools(mesh.polygons, "select") for mesh in segment_list.meshes_of(objects)}
         count = sum(int(selected.sum()) for selected in chosen.values())
         if count:
             if part is None:

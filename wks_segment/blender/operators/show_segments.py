@@ -8,7 +8,8 @@ from bpy.props import IntProperty
 
 from ...core.mesh.triangle_mesh import BoolArray, IntArray
 from ..outputs.labels import labels_on
-from ..outputs.overrides import values
+from ..scene.attributes import read_bools, read_ints, write_bools
+from ..scene.topology import at_corners
 from ..workflow import segment_list
 from . import _report
 
@@ -33,7 +34,7 @@ class _Shows:
             for mesh in meshes:
                 labels = labels_on(mesh)
                 if labels is not None:
-                    hidden = self.hidden(labels, values(mesh.polygons, "hide", bool), settings)
+                    hidden = self.hidden(labels, read_bools(mesh.polygons, "hide"), settings)
                     _hide(mesh, hidden)
                     count += int(hidden.sum())
             segment_list.fill(settings)
@@ -81,12 +82,12 @@ class WKS_SEGMENT_OT_show_segments(_Shows, bpy.types.Operator):
 
 def _hide(mesh: bpy.types.Mesh, hidden: BoolArray) -> None:
     """Hide these faces, and the vertices and edges that are of hidden faces only."""
-    corners = np.repeat(hidden, values(mesh.polygons, "loop_total", np.int32))
+    corners = at_corners(mesh, hidden)
     for elements, of_corner in ((mesh.vertices, "vertex_index"), (mesh.edges, "edge_index")):
-        of = values(mesh.loops, of_corner, np.int32)
-        gone = values(elements, "hide", bool)
+        of = read_ints(mesh.loops, of_corner)
+        gone = read_bools(elements, "hide")
         gone[of] = True
         gone[of[~corners]] = False
-        elements.foreach_set("hide", gone)
-    mesh.polygons.foreach_set("hide", hidden)
+        write_bools(elements, "hide", gone)
+    write_bools(mesh.polygons, "hide", hidden)
     mesh.update()

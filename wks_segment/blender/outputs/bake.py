@@ -13,10 +13,11 @@ from ...core.mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ...core.poses.describe import Progress
 from ..errors import UserError
 from ..parts.part_style import Style
+from ..scene.attributes import new_attribute, read_attribute, read_floats, read_ints, read_pixels, write_ints
 from ..scene.characters import Character
 from .id_map import NAME, NOTHING, with_margin, write_id_map
 from .labels import labels_on
-from .ledger import note_of, read_attribute
+from .ledger import note_of
 from .uv_maps import project, write_uv_map
 
 ENGINE = "CYCLES"
@@ -121,10 +122,9 @@ def bake_parts(context: bpy.types.Context, obj: bpy.types.Object, size: int, war
         ):
             image.scale(size, size)
             bpy.ops.object.bake(type="EMIT", margin=0, use_clear=True, uv_layer=uv_map)
-        pixels = np.empty(4 * size * size, dtype=np.float32)
-        image.pixels.foreach_get(pixels)
+        pixels = read_pixels(image)
         areas, inside = _uv_areas(copy.data, uv_map)
-    part_map = np.rint(pixels[::4]).astype(np.int64).reshape(size, size) - 1
+    part_map = np.rint(pixels[:, :, 0]).astype(np.int64) - 1
     covered = np.count_nonzero(part_map != NOTHING) / size**2
     if covered == 0:
         raise UserError(f'"{obj.name}": no face of the UV map "{uv_map}" covers a pixel: take a larger size')
@@ -149,11 +149,8 @@ def _is_beside(first: BoolArray, second: BoolArray) -> bool:
 def _uv_areas(mesh: bpy.types.Mesh, uv_map: str) -> tuple[FloatArray, BoolArray]:
     """(m,) area of each triangle of a mesh in a UV map, and whether its middle is in the image."""
     mesh.calc_loop_triangles()
-    corners = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
-    mesh.loop_triangles.foreach_get("loops", corners)
-    uvs = np.empty(2 * len(mesh.loops), dtype=np.float32)
-    mesh.uv_layers[uv_map].data.foreach_get("uv", uvs)
-    triangles = uvs.reshape(-1, 2)[corners].reshape(-1, 3, 2).astype(np.float64)
+    corners = read_ints(mesh.loop_triangles, "loops", 3)
+    triangles = read_floats(mesh.uv_layers[uv_map].data, "uv", 2)[corners].astype(np.float64)
     (ux, uy), (vx, vy) = (np.moveaxis(triangles[:, i] - triangles[:, 0], -1, 0) for i in (1, 2))
     middle = triangles.mean(axis=1)
     return np.abs(ux * vy - uy * vx) / 2, ((middle >= 0) & (middle <= 1)).all(axis=1)
@@ -192,9 +189,8 @@ def _copy(
     try:
         mesh.materials.clear()
         mesh.materials.append(material)
-        mesh.polygons.foreach_set("material_index", np.zeros(len(mesh.polygons), dtype=np.int32))
-        value = mesh.attributes.new(VALUE, "FLOAT", "FACE")
-        value.data.foreach_set("value", (labels + 1).astype(np.float32))
+        write_ints(mesh.polygons, "material_index", np.zeros(len(mesh.polygons)))
+        new_attribute(mesh, VALUE, "FLOAT", "FACE", labels + 1)
         scene.collection.objects.link(copy)
         scene.view_layers[0].objects.active = copy
         copy.select_set(True, view_layer=scene.view_layers[0])
@@ -215,7 +211,7 @@ def _as_seen(context: bpy.types.Context, obj: bpy.types.Object) -> tuple[bpy.typ
     mesh = bpy.data.meshes.new_from_object(
         obj.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph
     )
-    labels = read_attribute(mesh, note_of(obj.data)["faces"], np.int32)
+    labels = read_attribute(mesh, note_of(obj.data)["faces"])
     if labels is None or obj.data.uv_layers.active.name not in mesh.uv_layers:
         bpy.data.meshes.remove(mesh)
         mesh = obj.data.copy()

@@ -11,12 +11,12 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
+from ..scene.attributes import read_floats
 from ..scene.characters import Character
-from ..scene.marked_edges import neighbors
 from ..scene.mesh_arrays import Body
 from ..scene.poses import polygon_ranges
+from ..scene.topology import neighbors
 from .labels import labels_on
-from .overrides import values
 
 
 def pieces_of(characters: Sequence[Character], part: int, least_share: float) -> dict[Character, IntArray]:
@@ -41,7 +41,7 @@ def _pieces(character: Character, part: int, least_share: float) -> IntArray:
         on_mesh = labels_on(obj.data)
         labels.append(np.full(polygons.stop - polygons.start, -1) if on_mesh is None else on_mesh)
         pairs.append(polygons.start + neighbors(obj.data))
-        areas.append(values(obj.data.polygons, "area", np.float32))
+        areas.append(read_floats(obj.data.polygons, "area"))
     label, area = np.concatenate(labels), np.concatenate(areas).astype(np.float64)
     pair = np.concatenate(pairs)
     inside = pair[(label[pair] == part).all(axis=1)]

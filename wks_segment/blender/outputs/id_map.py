@@ -12,6 +12,7 @@ from scipy.ndimage import distance_transform_edt
 from ...core.mesh.triangle_mesh import IntArray
 from ..errors import UserError
 from ..parts.part_style import Style
+from ..scene.attributes import write_pixels
 from .ledger import NOTE, note_of, open_note
 
 NAME = "{} ID Map"
@@ -50,7 +51,7 @@ def write_id_map(
     colors[:, 3] = 1.0
     there = numbers != NOTHING
     colors[there, :3] = np.rint(255 * style.colors_of(numbers[there])) / 255
-    image.pixels.foreach_set(colors[row.ravel()].ravel())
+    write_pixels(image, colors[row.reshape(part_map.shape)])
     image.update()
     image.pack()
     for mesh in meshes:

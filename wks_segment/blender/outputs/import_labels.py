@@ -12,9 +12,10 @@ import numpy as np
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ..errors import UserError
 from ..parts.part_ids import SIDE_STEP, segments_of
+from ..scene.attributes import read_attribute, read_ints
 from ..scene.characters import Character
 from .face_sets import FACE_SETS, FIRST
-from .ledger import note_of, read_attribute
+from .ledger import note_of
 from .materials import COMPONENT
 from .vertex_groups import group_weights, our_groups
 
@@ -87,7 +88,7 @@ def _find(obj: bpy.types.Object, source: str) -> _Found:
 
 
 def _face_sets(obj: bpy.types.Object) -> _Found:
-    numbers = read_attribute(obj.data, FACE_SETS, np.int32)
+    numbers = read_attribute(obj.data, FACE_SETS)
     if numbers is None:
         raise UserError(f'"{obj.name}" has no face sets: draw some in sculpt mode, or write those of segments')
     keys, index = np.unique(numbers, return_inverse=True)
@@ -99,8 +100,7 @@ def _materials(obj: bpy.types.Object) -> _Found:
     materials = [slot.material for slot in obj.material_slots]
     if not materials:
         raise UserError(f'"{obj.name}" has no materials: assign some, or write those of segments')
-    slots = np.empty(len(obj.data.polygons), dtype=np.int32)
-    obj.data.polygons.foreach_get("material_index", slots)
+    slots = read_ints(obj.data.polygons, "material_index")
     ours = {material: int(material[COMPONENT]) for material in materials if material and COMPONENT in material}
     # A number beyond the last slot shows the last one.
     return _Found(np.minimum(slots, len(materials) - 1), materials, ours)
@@ -112,9 +112,7 @@ def _groups(obj: bpy.types.Object) -> _Found:
     names = [name for name in weights if not ours or name not in note.get("own_groups", [])]
     if not names:
         raise UserError(f'"{obj.name}" has no vertex groups: add some, or write those of segments')
-    corners, starts = (np.empty(len(of), dtype=np.int32) for of in (obj.data.loops, obj.data.polygons))
-    obj.data.loops.foreach_get("vertex_index", corners)
-    obj.data.polygons.foreach_get("loop_start", starts)
+    corners, starts = read_ints(obj.data.loops, "vertex_index"), read_ints(obj.data.polygons, "loop_start")
     sums = np.add.reduceat(np.stack([weights[name] for name in names], axis=1)[corners], starts, axis=0)
     # Faces of no group are of one more part.
     index = np.where(sums.any(axis=1), sums.argmax(axis=1), len(names))

@@ -10,9 +10,11 @@ import numpy as np
 
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ..parts.part_style import PLAIN, Style
+from ..scene.attributes import read_face_ints, read_ints, write_attribute
+from ..scene.topology import at_corners
 from .face_sets import remove_face_sets, write_face_sets
 from .id_map import remove_id_map
-from .ledger import NOTE, add_attribute, has_note, note_of, read_ints
+from .ledger import NOTE, add_attribute, has_note, note_of
 from .materials import remove_materials, write_materials
 from .seams import remove_seams, write_seams
 from .uv_maps import remove_uv_map
@@ -84,7 +86,7 @@ def has_labels(mesh: bpy.types.Mesh) -> bool:
 
 def labels_on(mesh: bpy.types.Mesh) -> IntArray | None:
     """(p,) parts of a mesh's polygons, as they were written; None if there are none."""
-    return read_ints(mesh, note_of(mesh).get("faces", ""))
+    return read_face_ints(mesh, note_of(mesh).get("faces", ""))
 
 
 def _take_back(mesh: bpy.types.Mesh, note: dict[str, Any]) -> None:
@@ -108,18 +110,10 @@ def _take_back(mesh: bpy.types.Mesh, note: dict[str, Any]) -> None:
 
 def _at_vertices(mesh: bpy.types.Mesh, labels: IntArray) -> IntArray:
     """(n,) the label that most of the faces around each vertex have; 0 at a vertex without a face."""
-    corner_vertex = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corner_vertex)
     found, column = np.unique(labels, return_inverse=True)
     count = np.zeros((len(mesh.vertices), len(found)), dtype=np.int32)
-    np.add.at(count, (corner_vertex, _at_corners(mesh, column.ravel())), 1)
+    np.add.at(count, (read_ints(mesh.loops, "vertex_index"), at_corners(mesh, column.ravel())), 1)
     return np.where(count.any(axis=1), found[count.argmax(axis=1)], 0)
-
-
-def _at_corners(mesh: bpy.types.Mesh, labels: IntArray) -> IntArray:
-    corners = np.empty(len(mesh.polygons), dtype=np.int32)
-    mesh.polygons.foreach_get("loop_total", corners)
-    return np.repeat(labels, corners)
 
 
 def _write_colors(mesh: bpy.types.Mesh, labels: IntArray, style: Style) -> None:
@@ -127,8 +121,8 @@ def _write_colors(mesh: bpy.types.Mesh, labels: IntArray, style: Style) -> None:
     attribute = mesh.color_attributes.new(free_name(mesh, COLORS), "BYTE_COLOR", "CORNER")
     mesh[NOTE]["colors"] = attribute.name
     colors = np.ones((len(mesh.loops), 4), dtype=np.float32)
-    colors[:, :3] = style.colors_of(_at_corners(mesh, labels))
-    attribute.data.foreach_set("color_srgb", colors.ravel())
+    colors[:, :3] = style.colors_of(at_corners(mesh, labels))
+    write_attribute(attribute, colors)
     # What is rendered stays the user's, if there was something: only what is shown in solid view changes.
     if mesh.color_attributes.render_color_index < 0:
         mesh.color_attributes.render_color_index = mesh.color_attributes.find(attribute.name)

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.mesh.triangle_mesh import IntArray
+from ..scene.attributes import write_attribute
 from .vertex_groups import free_name
 
 NOTE = "wks_segment_note"
@@ -37,25 +37,5 @@ def add_attribute(
 ) -> None:  # fmt: skip
     """Add an attribute and note the name that it got: a name that is taken gets a number."""
     attribute = mesh.attributes.new(free_name(mesh, name), kind, domain)
-    mesh[NOTE][key] = attribute.name
-    attribute.data.foreach_set("value", values)
-
-
-def read_ints(mesh: bpy.types.Mesh, name: str) -> IntArray | None:
-    """(p,) values of an int attribute of faces; None if there is none of that name."""
-    attribute = mesh.attributes.get(name)
-    if attribute is None or (attribute.data_type, attribute.domain) != ("INT", "FACE"):
-        return None
-    values = np.empty(len(attribute.data), dtype=np.int32)
-    attribute.data.foreach_get("value", values)
-    return values.astype(np.int64)
-
-
-def read_attribute(mesh: bpy.types.Mesh, name: str, dtype: type) -> NDArray[Any] | None:
-    """(k,) values of an attribute of that name; None if there is none."""
-    attribute = mesh.attributes.get(name)
-    if attribute is None:
-        return None
-    values: NDArray[Any] = np.empty(len(attribute.data), dtype=dtype)
-    attribute.data.foreach_get("value", values)
-    return values
+    mesh[NOTE][key] = attribute.name  # before the values are written, so that Clear finds it whatever happens
+    write_attribute(attribute, values)

@@ -11,7 +11,8 @@ from ...core.mesh.triangle_mesh import IntArray
 from ..parts import part_ids
 from ..parts.palette import linear
 from ..parts.part_style import Style
-from .ledger import NOTE, add_attribute, note_of, read_attribute
+from ..scene.attributes import read_attribute, read_ints, write_ints
+from .ledger import NOTE, add_attribute, note_of
 
 OWN_MATERIALS = "wks_segment_own_material"
 """Face attribute that keeps the material index of each face from before ours."""
@@ -27,15 +28,14 @@ def write_materials(
     """Add a slot for each of the (p,) parts of polygons, behind the mesh's own, with a material or a colored copy."""
     mesh[NOTE]["had_material_index"] = "material_index" in mesh.attributes
     mesh[NOTE]["first_slot"] = len(mesh.materials)
-    before = np.empty(len(mesh.polygons), dtype=np.int32)
-    mesh.polygons.foreach_get("material_index", before)
+    before = read_ints(mesh.polygons, "material_index")
     add_attribute(mesh, "own_materials", OWN_MATERIALS, "INT", "FACE", before)
     slot = np.zeros(int(labels.max()) + 1, dtype=np.int32)
     for part in part_ids.unique_parts(labels):
         slot[part] = len(mesh.materials)
         mesh.materials.append(_material(part, style, template))
     mesh[NOTE]["last_slot"] = len(mesh.materials)
-    mesh.polygons.foreach_set("material_index", slot[labels])
+    write_ints(mesh.polygons, "material_index", slot[labels])
 
 
 def remove_materials(mesh: bpy.types.Mesh, note: dict[str, Any]) -> None:
@@ -51,7 +51,7 @@ def remove_materials(mesh: bpy.types.Mesh, note: dict[str, Any]) -> None:
             mesh.materials.pop(index=index)
         if material.users == 0:
             bpy.data.materials.remove(material)
-    mesh.polygons.foreach_set("material_index", restored.astype(np.int32))
+    write_ints(mesh.polygons, "material_index", restored)
     if not note["had_material_index"] and "material_index" in mesh.attributes:
         mesh.attributes.remove(mesh.attributes["material_index"])
 
@@ -59,14 +59,13 @@ def remove_materials(mesh: bpy.types.Mesh, note: dict[str, Any]) -> None:
 def own_material_index(mesh: bpy.types.Mesh) -> IntArray:
     """(p,) material slot of each polygon, without what `write_materials` wrote: the slots that Clear leaves."""
     note = note_of(mesh)
-    now = np.empty(len(mesh.polygons), dtype=np.int32)
-    mesh.polygons.foreach_get("material_index", now)
+    now = read_ints(mesh.polygons, "material_index")
     ours = _our_slots(mesh, note)
-    own = read_attribute(mesh, note.get("own_materials", ""), np.int32)
+    own = read_attribute(mesh, note.get("own_materials", ""))
     if own is None:
         own = np.zeros_like(now)
     # Slots that the user added behind ours move up.
-    moved = now - np.searchsorted(ours, now).astype(np.int32)
+    moved = now - np.searchsorted(ours, now)
     return np.where(np.isin(now, ours), own, moved)
 
 

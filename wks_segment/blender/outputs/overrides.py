@@ -8,18 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ..parts import part_ids
 from ..parts.part_style import Style
+from ..scene.attributes import read_face_ints, read_floats, write_attribute
 from .labels import labels_on, write_labels
-from .ledger import NOTE, add_attribute, note_of, read_ints
+from .ledger import NOTE, add_attribute, note_of
 from .materials import COMPONENT, template_of
 from .vertex_groups import read_groups
 from .vertex_weights import hard_weights
@@ -32,7 +31,7 @@ MODEL_LABELS = "wks_segment_model"
 
 def by_hand(mesh: bpy.types.Mesh) -> IntArray:
     """(p,) part that each polygon was given by hand, −1 for none."""
-    kept = read_ints(mesh, note_of(mesh).get("by_hand", ""))
+    kept = read_face_ints(mesh, note_of(mesh).get("by_hand", ""))
     return np.full(len(mesh.polygons), -1) if kept is None else kept - 1
 
 
@@ -43,7 +42,7 @@ def keep_by_hand(mesh: bpy.types.Mesh, given: IntArray) -> None:
 
 def model_labels(mesh: bpy.types.Mesh) -> IntArray | None:
     """(p,) parts of polygons as the model gives them; None if there are no labels."""
-    kept = read_ints(mesh, note_of(mesh).get("model_labels", ""))
+    kept = read_face_ints(mesh, note_of(mesh).get("model_labels", ""))
     return labels_on(mesh) if kept is None else kept
 
 
@@ -107,7 +106,7 @@ def moved(
     The weight of a part goes to what the nearest polygon of that part has become.
     """
     result: dict[int, FloatArray] = {}
-    vertices, centers = values(mesh.vertices, "co", np.float32, 3), values(mesh.polygons, "center", np.float32, 3)
+    vertices, centers = read_floats(mesh.vertices, "co", 3), read_floats(mesh.polygons, "center", 3)
     for part, of_part in weights.items():
         mine = np.flatnonzero(before == part)
         found = part_ids.unique_parts(after[mine]) or [part]
@@ -129,7 +128,7 @@ def _keep(mesh: bpy.types.Mesh, key: str, name: str, values: IntArray | None) ->
     elif attribute is None:
         add_attribute(mesh, key, name, "INT", "FACE", values.astype(np.int32))
     else:
-        attribute.data.foreach_set("value", values.astype(np.int32))
+        write_attribute(attribute, values)
 
 
 @contextmanager
@@ -146,10 +145,3 @@ def _materials_kept(mesh: bpy.types.Mesh) -> Iterator[None]:
             material.use_fake_user = fake
             if material.users == 0:
                 bpy.data.materials.remove(material)
-
-
-def values(collection: bpy.types.bpy_prop_collection, name: str, dtype: type, width: int = 1) -> NDArray[Any]:
-    """(n,) or, of more than one number each, (n, width) values of a property."""
-    found: NDArray[Any] = np.empty(len(collection) * width, dtype=dtype)
-    collection.foreach_get(name, found)
-    return found if width == 1 else found.reshape(-1, width)

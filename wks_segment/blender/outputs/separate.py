@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ...core.mesh.triangle_mesh import BoolArray, IntArray
 from ..parts import part_ids
 from ..parts.part_style import Style
+from ..scene.attributes import read_floats, read_ints
 from .ledger import NOTE
 from .vertex_groups import group_weights
 
@@ -120,21 +121,15 @@ def _print(piece: bpy.types.Object) -> str:
     if piece.animation_data is None:
         told += [f"{value:.9g}" for row in piece.matrix_basis for value in row]
     shapes = [block.data for block in mesh.shape_keys.key_blocks] if mesh.shape_keys else [mesh.vertices]
-    values = [
+    values: list[NDArray[Any]] = [
         np.frombuffer("\n".join(told).encode(), dtype=np.uint8),
-        _read(mesh.loops, "vertex_index", 1, np.int32),
-        *(_read(shape, "co", 3, np.float32) for shape in shapes),
-        *(_read(layer.data, "uv", 2, np.float32) for layer in mesh.uv_layers),
-        *(_read(layer.data, "color", 4, np.float32) for layer in mesh.color_attributes),
+        read_ints(mesh.loops, "vertex_index").astype(np.int32),
+        *(read_floats(shape, "co", 3) for shape in shapes),
+        *(read_floats(layer.data, "uv", 2) for layer in mesh.uv_layers),
+        *(read_floats(layer.data, "color", 4) for layer in mesh.color_attributes),
         *group_weights(mesh).values(),
     ]
     total = 0
     for array in values:
         total = crc32(array.tobytes(), total)
     return f"{total:08x}"
-
-
-def _read(collection: bpy.types.bpy_prop_collection, name: str, width: int, dtype: type) -> NDArray[Any]:
-    values: NDArray[Any] = np.empty(len(collection) * width, dtype=dtype)
-    collection.foreach_get(name, values)
-    return values

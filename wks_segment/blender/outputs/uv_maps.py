@@ -15,8 +15,17 @@ from mathutils.geometry import box_pack_2d
 from ...core.mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ..errors import UserError
 from ..parts import part_ids
-from .ledger import NOTE, note_of, open_note, read_attribute
-from .seams import borders
+from ..scene.attributes import (
+    new_attribute,
+    read_attribute,
+    read_bools,
+    read_floats,
+    read_ints,
+    write_bools,
+    write_floats,
+)
+from ..scene.topology import at_corners, border_edges, polygon_sizes
+from .ledger import NOTE, note_of, open_note
 from .vertex_groups import free_name
 
 NAME = "WKS Segment"
@@ -48,7 +57,7 @@ def write_uv_map(mesh: bpy.types.Mesh, uvs: FloatArray) -> None:
         open_note(mesh)["active_uv"] = "" if active is None else active.name
         layer = mesh.uv_layers.new(name=free_name(mesh, NAME), do_init=False)
         mesh[NOTE]["uv_map"] = layer.name
-    layer.data.foreach_set("uv", uvs.astype(np.float32).ravel())
+    write_floats(layer.data, "uv", uvs)
     mesh.uv_layers.active = layer
     mesh.update()
 
@@ -79,10 +88,8 @@ def unwrap_parts(context: bpy.types.Context, mesh: bpy.types.Mesh, labels: IntAr
     """(corners, 2) UVs of a mesh, cut along the borders of its (p,) parts and by one of `METHODS`; parts apart."""
     with _copy(context, mesh) as copy:
         part_of = labels[_ints(copy, POLYGON)]
-        seams = np.empty(len(copy.edges), dtype=bool)
-        copy.edges.foreach_get("use_seam", seams)
-        copy.edges.foreach_set("use_seam", seams | borders(copy, part_of))
-        corners = np.repeat(part_of, _corners(copy))
+        write_bools(copy.edges, "use_seam", read_bools(copy.edges, "use_seam") | border_edges(copy, part_of))
+        corners = at_corners(copy, part_of)
         found, boxes = part_ids.unique_parts(part_of), []
         for part in found if method == SMART else []:
             _project(copy, part_of == part)
@@ -131,8 +138,8 @@ def _copy(context: bpy.types.Context, mesh: bpy.types.Mesh) -> Iterator[bpy.type
             copy.uv_layers.remove(copy.uv_layers[-1])
         copy.uv_layers.new(name=NAME, do_init=False)
         for name, domain in ((POLYGON, "FACE"), (CORNER, "CORNER")):
-            origin = copy.attributes.new(name, "INT", domain).data
-            origin.foreach_set("value", np.arange(len(origin), dtype=np.int32))
+            count = len(copy.polygons) if domain == "FACE" else len(copy.loops)
+            new_attribute(copy, name, "INT", domain, np.arange(count))
         _weld(copy)
         context.scene.collection.objects.link(holder)
         for obj in selected:
@@ -159,7 +166,7 @@ def _project(mesh: bpy.types.Mesh, shown: BoolArray) -> None:
 
 def _points(mesh: bpy.types.Mesh) -> BoolArray:
     """(p,) whether all corners of a polygon are at one point of the UV map."""
-    uvs, count = _read(mesh), _corners(mesh)
+    uvs, count = _read(mesh), polygon_sizes(mesh)
     first = np.cumsum(count) - count
     size = np.maximum.reduceat(uvs, first) - np.minimum.reduceat(uvs, first)
     return np.asarray(size.max(axis=1) == 0)
@@ -179,7 +186,7 @@ def _of_own_corners(mesh: bpy.types.Mesh, corner_of: IntArray, uvs: FloatArray) 
     """(corners, 2) UVs of a mesh from those of its welded copy; a corner that is gone has those of the nearest left."""
     own = np.full((len(mesh.loops), 2), np.nan)
     own[corner_of] = uvs
-    count = _corners(mesh)
+    count = polygon_sizes(mesh)
     first = np.cumsum(count) - count
     polygon_of = np.repeat(np.arange(len(count)), count)
     for polygon in np.unique(polygon_of[np.isnan(own[:, 0])]).tolist():
@@ -195,12 +202,10 @@ def _of_own_corners(mesh: bpy.types.Mesh, corner_of: IntArray, uvs: FloatArray) 
 @contextmanager
 def _edit(mesh: bpy.types.Mesh, shown: BoolArray) -> Iterator[None]:
     """Edit mode of the active object, with these (p,) polygons of its mesh selected and the others hidden."""
-    mesh.polygons.foreach_set("hide", ~shown)
+    write_bools(mesh.polygons, "hide", ~shown)
     used = np.zeros(len(mesh.vertices), dtype=bool)
-    corners = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corners)
-    used[corners[np.repeat(shown, _corners(mesh))]] = True
-    mesh.vertices.foreach_set("hide", ~used)
+    used[read_ints(mesh.loops, "vertex_index")[at_corners(mesh, shown)]] = True
+    write_bools(mesh.vertices, "hide", ~used)
     bpy.ops.object.mode_set(mode="EDIT")
     try:
         bpy.ops.mesh.select_all(action="SELECT")
@@ -211,19 +216,10 @@ def _edit(mesh: bpy.types.Mesh, shown: BoolArray) -> Iterator[None]:
 
 
 def _ints(mesh: bpy.types.Mesh, name: str) -> IntArray:
-    values = read_attribute(mesh, name, np.int32)
+    values = read_attribute(mesh, name)
     assert values is not None
     return values.astype(np.int64)
 
 
-def _corners(mesh: bpy.types.Mesh) -> IntArray:
-    """(p,) number of corners of each polygon."""
-    count = np.empty(len(mesh.polygons), dtype=np.int32)
-    mesh.polygons.foreach_get("loop_total", count)
-    return count.astype(np.int64)
-
-
 def _read(mesh: bpy.types.Mesh) -> FloatArray:
-    uvs = np.empty((len(mesh.loops), 2), dtype=np.float32)
-    mesh.uv_layers[0].data.foreach_get("uv", uvs.ravel())
-    return uvs.astype(np.float64)
+    return read_floats(mesh.uv_layers[0].data, "uv", 2).astype(np.float64)

@@ -13,8 +13,9 @@ from ...core import PoseSegmentation, Workpiece
 from ...core.mesh.surface import indicator
 from ...core.mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ..parts import part_ids
-from ..scene.mesh_arrays import Body, corners_of
+from ..scene.mesh_arrays import Body
 from ..scene.poses import Pose
+from ..scene.topology import corners_of
 
 LEAST = 0.01
 """Smaller soft weights are left out: nearly every vertex would be in every group."""

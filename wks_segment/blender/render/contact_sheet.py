@@ -17,6 +17,7 @@ from mathutils import Matrix, Vector
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ..errors import UserError
 from ..parts.part_style import PLAIN, Style
+from ..scene.attributes import write_attribute
 from ..scene.poses import Pose
 
 TILE = 480
@@ -133,7 +134,7 @@ def paint(mesh: bpy.types.Mesh, srgb: FloatArray) -> None:
     colors = np.ones((len(mesh.loops), 4), dtype=np.float32)
     colors[:, :3] = srgb
     attribute = mesh.color_attributes.new(COLORS, "BYTE_COLOR", "CORNER")
-    attribute.data.foreach_set("color_srgb", colors.ravel())
+    write_attribute(attribute, colors)
     mesh.color_attributes.active_color = attribute
 
 

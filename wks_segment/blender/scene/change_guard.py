@@ -6,10 +6,11 @@ from collections.abc import Iterable
 from hashlib import blake2b
 
 import bpy
-import numpy as np
 
 from ..errors import ChangedError
+from .attributes import read_floats, read_ints
 from .characters import Character, Member
+from .topology import polygon_sizes
 
 
 class Watch:
@@ -65,12 +66,6 @@ def _check(member: Member, obj: bpy.types.Object | None, state: tuple[str, int, 
 def _content(mesh: bpy.types.Mesh) -> bytes:
     """A number, as good as unique, for the coordinates and faces of a mesh."""
     digest = blake2b(digest_size=16)
-    for collection, name, width, dtype in (
-        (mesh.vertices, "co", 3, np.float32),
-        (mesh.loops, "vertex_index", 1, np.int32),
-        (mesh.polygons, "loop_total", 1, np.int32),
-    ):
-        values = np.empty(width * len(collection), dtype=dtype)
-        collection.foreach_get(name, values)
+    for values in (read_floats(mesh.vertices, "co", 3), read_ints(mesh.loops, "vertex_index"), polygon_sizes(mesh)):
         digest.update(values.tobytes())
     return digest.digest()

@@ -1,4 +1,4 @@
-"""The poses to learn from, as the settings say where they are."""
+"""Reads the poses to learn from, taken from where the settings say."""
 
 from __future__ import annotations
 
@@ -8,15 +8,14 @@ import bpy
 
 from ..errors import UserError
 from ..props.settings import WKSSegmentSettings
-from ..workflow.report import Report, pose_warnings
-from . import poses as reader
+from . import poses
 from .characters import Character, armature_of, group, selected_meshes
 from .pose_library import read_actions
 from .poses import Pose
 
 
-def read_training_poses(context: bpy.types.Context, settings: WKSSegmentSettings, report: Report) -> list[Pose]:
-    """Poses to learn from, as the settings say where they are.
+def read_training_poses(context: bpy.types.Context, settings: WKSSegmentSettings) -> list[Pose]:
+    """Poses to learn from, taken from where the settings say.
 
     Raises
     ------
@@ -24,23 +23,16 @@ def read_training_poses(context: bpy.types.Context, settings: WKSSegmentSettings
         If there are none there, or they cannot be used.
     """
     characters = group(selected_meshes(context))
-    with report.stage("read"):
-        if settings.source == "OBJECTS":
-            poses = reader.read_objects(context, characters)
-        else:
-            character = active_character(context, characters)
-            if settings.source == "SHAPE_KEYS":
-                poses = reader.read_shape_keys(context, character, settings.pose_count)
-            elif settings.source == "MARKERS":
-                poses = reader.read_markers(context, character, settings.pose_count)
-            elif settings.source == "ACTIONS":
-                poses = read_actions(context, character, settings.pose_count)
-            else:
-                frames = chosen_frames(context.scene, character, settings)
-                poses = reader.read_frames(context, character, frames)
-    report.poses = poses
-    report.warnings += pose_warnings(poses, settings.source in ("FRAMES", "MARKERS"))
-    return poses
+    if settings.source == "OBJECTS":
+        return poses.read_objects(context, characters)
+    character = active_character(context, characters)
+    if settings.source == "SHAPE_KEYS":
+        return poses.read_shape_keys(context, character, settings.pose_count)
+    if settings.source == "MARKERS":
+        return poses.read_markers(context, character, settings.pose_count)
+    if settings.source == "ACTIONS":
+        return read_actions(context, character, settings.pose_count)
+    return poses.read_frames(context, character, chosen_frames(context.scene, character, settings))
 
 
 def active_character(context: bpy.types.Context, characters: Sequence[Character]) -> Character:
@@ -69,9 +61,9 @@ def chosen_frames(scene: bpy.types.Scene, character: Character, settings: WKSSeg
         If the user's range ends before it begins.
     """
     if not settings.use_frame_range:
-        return reader.own_frames(scene, character, settings.pose_count)
+        return poses.own_frames(scene, character, settings.pose_count)
     if settings.frame_last < settings.frame_first:
         raise UserError(
             f"The frame range ends ({settings.frame_last}) before it begins ({settings.frame_first}): swap them"
         )
-    return reader.evenly(settings.frame_first, settings.frame_last, settings.pose_count)
+    return poses.evenly(settings.frame_first, settings.frame_last, settings.pose_count)

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core import TriangleMesh
 from ...core.mesh.triangle_mesh import FloatArray, IntArray, repeats_a_vertex
 from ..errors import UserError
+from .attributes import new_attribute, read_floats, read_ints
 from .characters import Character, armature_of
 
 ORIGIN = ".wks_segment_origin"
@@ -293,9 +292,9 @@ def _read_object(
     mesh = evaluated.to_mesh()
     try:
         mesh.calc_loop_triangles()
-        vertices = _get(mesh.vertices, "co", 3, np.float32).reshape(-1, 3)
-        triangles = _get(mesh.loop_triangles, "vertices", 3, np.int32).reshape(-1, 3)
-        polygon_of = _get(mesh.loop_triangles, "polygon_index", 1, np.int32)
+        vertices = read_floats(mesh.vertices, "co", 3).astype(np.float64)
+        triangles = read_ints(mesh.loop_triangles, "vertices", 3)
+        polygon_of = read_ints(mesh.loop_triangles, "polygon_index")
         same = _has_corners_of(mesh, obj.data)
         if origin_name is not None and len(mesh.polygons):
             origin = mesh.attributes.get(origin_name)
@@ -303,7 +302,7 @@ def _read_object(
                 raise UserError(
                     f'"{obj.name}": a modifier makes faces and hides of what (as Remesh): apply it, or turn it off'
                 )
-            polygons = _get(origin.data, "value", 1, np.int32) - 1
+            polygons = read_ints(origin.data, "value") - 1
             same &= np.array_equal(polygons, np.arange(len(obj.data.polygons)))
             polygon_of = polygons[polygon_of]
         world = np.array(evaluated.matrix_world, dtype=np.float64)
@@ -312,20 +311,14 @@ def _read_object(
     with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is refused by name
         vertices = vertices @ world[:3, :3].T + world[:3, 3]
     vertex_of = np.arange(len(vertices)) if same else np.full(len(vertices), -1)
-    return vertices, triangles.astype(np.int64), polygon_of.astype(np.int64), vertex_of
+    return vertices, triangles, polygon_of, vertex_of
 
 
 def _has_corners_of(mesh: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:
     """Whether the corners of two meshes' faces are at the same vertices: those of one are then those of the other."""
     return len(mesh.vertices) == len(other.vertices) and np.array_equal(
-        _get(mesh.loops, "vertex_index", 1, np.int32), _get(other.loops, "vertex_index", 1, np.int32)
+        read_ints(mesh.loops, "vertex_index"), read_ints(other.loops, "vertex_index")
     )
-
-
-def _get(collection: bpy.types.bpy_prop_collection, name: str, width: int, dtype: type) -> NDArray[Any]:
-    values: NDArray[Any] = np.empty(len(collection) * width, dtype=dtype)
-    collection.foreach_get(name, values)
-    return values
 
 
 @contextmanager
@@ -338,9 +331,7 @@ def _marked_origins(character: Character) -> Iterator[dict[bpy.types.Mesh, str]]
     names: dict[bpy.types.Mesh, str] = {}
     try:
         for mesh in meshes:
-            origin = mesh.attributes.new(ORIGIN, "INT", "FACE")
-            names[mesh] = origin.name
-            origin.data.foreach_set("value", np.arange(1, len(mesh.polygons) + 1, dtype=np.int32))
+            names[mesh] = new_attribute(mesh, ORIGIN, "INT", "FACE", np.arange(1, len(mesh.polygons) + 1)).name
             mesh.update_tag()
         yield names
     finally:

@@ -28,6 +28,7 @@ from ...core.poses.describe import Progress
 from ...core.segmentation import DESCRIBED
 from ...core.spectral.memory import available_memory
 from ..errors import TooLargeError, UserError
+from ..outputs.marked_edges import marked_pairs
 from ..outputs.overrides import write_edited
 from ..outputs.vertex_weights import by_parts, soft_weights
 from ..parts import part_ids
@@ -87,7 +88,10 @@ class Wanted:
             settings.write_seams,
             settings.material_template.name if settings.material_template is not None else "",
             settings.style(),
-            {character: Body.of(character, settings.snap_to) for character in dict.fromkeys(characters)},
+            {
+                character: Body.of(character, marked_pairs(character, settings.snap_to))
+                for character in dict.fromkeys(characters)
+            },
         )
 
 

@@ -16,13 +16,15 @@ from ...core.user_labels import LONGEST_NAME
 from ..outputs.labels import has_labels, labels_on
 from ..outputs.ledger import NOTE, note_of
 from ..outputs.materials import COMPONENT, recolor_material
-from ..outputs.overrides import by_hand, keep_by_hand, model_labels, rewrite, values
+from ..outputs.overrides import by_hand, keep_by_hand, model_labels, rewrite
 from ..outputs.vertex_groups import rename_group
 from ..parts import part_ids
 from ..parts.palette import most_different
 from ..parts.part_style import Style
+from ..scene.attributes import read_bools, read_floats, write_attribute
 from ..scene.characters import Character, mesh_objects, with_rigged
 from ..scene.poses import polygon_ranges
+from ..scene.topology import at_corners
 
 if TYPE_CHECKING:
     from ..props.settings import WKSSegmentSettings
@@ -63,8 +65,8 @@ def fill(settings: WKSSegmentSettings) -> None:
             continue
         # An object's scale counts, since a character's objects can have different ones.
         scale = abs(np.linalg.det(np.array(obj.matrix_world)[:3, :3])) ** (2 / 3)
-        areas = scale * values(obj.data.polygons, "area", np.float32)
-        shown = ~values(obj.data.polygons, "hide", bool)
+        areas = scale * read_floats(obj.data.polygons, "area")
+        shown = ~read_bools(obj.data.polygons, "hide")
         for part in np.unique(labels).tolist():
             mine = labels == part
             area[part] = area.get(part, 0.0) + float(areas[mine].sum())
@@ -198,7 +200,7 @@ def _successors(labels: Mapping[Character, IntArray]) -> dict[int, int]:
             if old is not None:
                 before.append(old)
                 after.append(new[polygons])
-                areas.append(values(obj.data.polygons, "area", np.float32))
+                areas.append(read_floats(obj.data.polygons, "area"))
     if not before:
         return {}
     old_parts, row = np.unique(np.concatenate(before), return_inverse=True)
@@ -242,8 +244,8 @@ def _recolor_faces(mesh: bpy.types.Mesh, part: int, style: Style) -> None:
     labels, colors = labels_on(mesh), mesh.color_attributes.get(note_of(mesh).get("colors", ""))
     if labels is None or colors is None:
         return
-    corners = np.repeat(labels == part, values(mesh.polygons, "loop_total", np.int32))
-    painted = values(colors.data, "color_srgb", np.float32, 4)
+    corners = at_corners(mesh, labels == part)
+    painted = read_floats(colors.data, "color_srgb", 4)
     painted[corners, :3] = style.colors_of(np.array([part]))
-    colors.data.foreach_set("color_srgb", painted.ravel())
+    write_attribute(colors, painted)
     mesh.update()

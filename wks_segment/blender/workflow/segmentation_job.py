@@ -22,7 +22,7 @@ from ..scene.poses import Pose
 from . import model_library, pipeline
 from .live_session import session_of
 from .pipeline import Wanted
-from .report import Report, segment_warnings
+from .report import Report, pose_warnings, segment_warnings
 
 LEARNED, DESCRIBED = 0.9, 0.6
 """Share of the work that is done when labeling begins: in learning, and in applying."""
@@ -73,9 +73,11 @@ class Work:
     @classmethod
     def learning(cls, context: bpy.types.Context) -> Work:
         """Read poses and settings to learn from; UserError if they cannot be used."""
-        report = Report([])
-        poses = read_training_poses(context, context.scene.wks_segment, report)
-        return cls._read(context, context.scene.wks_segment.new_model(), poses, report, learns=True)
+        settings, report = context.scene.wks_segment, Report([])
+        with report.stage("read"):
+            report.poses = read_training_poses(context, settings)
+        report.warnings += pose_warnings(report.poses, settings.source in ("FRAMES", "MARKERS"))
+        return cls._read(context, settings.new_model(), report.poses, report, learns=True)
 
     @classmethod
     def applying(

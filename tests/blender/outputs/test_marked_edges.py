@@ -6,8 +6,8 @@ import pytest
 from builders import labels_of, limbed, limbed_surface, mesh_object, select
 
 from wks_segment.blender.outputs.labels import write_labels
+from wks_segment.blender.outputs.marked_edges import marked_pairs
 from wks_segment.blender.scene.characters import Character
-from wks_segment.blender.scene.marked_edges import marked_pairs
 from wks_segment.core import PoseSegmentation
 
 pytestmark = pytest.mark.usefixtures("scene")
