@@ -1,11 +1,9 @@
 """Messages keep template and values, so that they can be said in another language."""
 
 import copy
-import json
 import pickle
 import warnings
 
-import numpy as np
 import pytest
 
 from wks_segment.core.message import Message, message_of
@@ -73,16 +71,3 @@ def test_so_does_a_warning():
 def test_an_error_of_the_system_says_what_it_says():
     assert message_of(FileNotFoundError(2, "gone", "a.json")) == "[Errno 2] gone: 'a.json'"
     assert message_of(KeyError(3)) == "3"
-
-
-def test_kept_as_json():
-    message = Message(
-        "{name} of {count}: {share:.2f} {reason}",
-        name="curve",
-        count=np.int64(3),
-        share=np.float32(0.25),
-        reason=Message("{x}", x=Message("curve")),
-    )
-    again = Message.from_dict(json.loads(json.dumps(message.to_dict())))
-    assert again == message
-    assert again.translated(german) == "curve of 3: 0.25 Kurve"

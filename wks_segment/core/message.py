@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from numbers import Integral, Real
-from typing import Any
 
 
 class Message(str):
@@ -56,31 +54,9 @@ class Message(str):
                 return template.format(**values)
         return str(self)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Template and values in types that JSON has; values that are neither numbers nor messages become text."""
-        return {"template": self.template, "values": {name: _plain(value) for name, value in self.values.items()}}
-
-    @classmethod
-    def from_dict(cls, content: dict[str, Any]) -> Message:
-        """The message of which `to_dict` gave the content; KeyError, TypeError or ValueError if it is none."""
-        values = {
-            name: cls.from_dict(value) if isinstance(value, dict) else value
-            for name, value in content["values"].items()
-        }
-        return cls(content["template"], **values)
-
 
 def message_of(error: BaseException) -> str:
     """The text of an error; the `Message` itself if it was raised with one, which `str(error)` would lose."""
     if len(error.args) == 1 and isinstance(error.args[0], str):
         return error.args[0]
     return str(error)
-
-
-def _plain(value: object) -> Any:
-    """A value of a message as JSON has it."""
-    if isinstance(value, Message):
-        return value.to_dict()
-    if isinstance(value, Integral):
-        return int(value)
-    return float(value) if isinstance(value, Real) else str(value)

@@ -298,8 +298,6 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
     ranked: StringProperty(options={"HIDDEN"}, description="Names of the objects that were ranked, as JSON")
     verdict: StringProperty(options={"HIDDEN"}, description="How sure the first of the ranking is")
 
-    kept_messages: StringProperty(options={"HIDDEN"}, description="Messages behind stored texts, as JSON")
-
     model: StringProperty(options={"HIDDEN"}, description="The model in use, as JSON")
     model_summary: StringProperty(options={"HIDDEN"}, description="Lines on what the model was learned from")
 
