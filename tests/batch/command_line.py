@@ -1,4 +1,4 @@
-"""The command line in a process of its own, small characters in files, and the list of a batch."""
+"""Helpers of batch tests: the command line in its own process, files of small characters, and the log of a batch."""
 
 import json
 import os
@@ -21,7 +21,7 @@ def write(path, bend):
 
 
 def start(*arguments):
-    # One thread here as in children: sums over more of them have other last digits.
+    # One thread, as children have: sums over several threads differ in their last digits.
     environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     return subprocess.Popen(
         [sys.executable, "-m", "wks_segment", *map(str, arguments)], cwd=ROOT, env=environment, text=True,
@@ -31,21 +31,17 @@ def start(*arguments):
 
 def run(*arguments):
     process = start(*arguments)
-    printed, said = process.communicate(timeout=120)
-    return process.returncode, printed, said
+    output, messages = process.communicate(timeout=120)
+    return process.returncode, output, messages
 
 
 def lines(folder):
     path = folder / "batch.jsonl"
-    # The last may be half written.
+    # The last line may be incomplete.
     return [json.loads(line) for line in path.read_text().split("\n")[:-1]] if path.exists() else []
 
 
 def wait_for_lines(folder, count, process):
-    until = time.monotonic() + 60
-    while len(lines(folder)) < count and process.poll() is None and time.monotonic() < until:
+    deadline = time.monotonic() + 60
+    while len(lines(folder)) < count and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.02)
-
-
-def quiet(stage, share):
-    """Progress that is not shown."""

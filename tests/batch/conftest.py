@@ -1,4 +1,4 @@
-"""What the tests of batches share. Blender runs in child processes only, so that these tests run beside any bpy."""
+"""Fixtures of the batch tests. Blender runs in child processes only, so these tests do not need a bpy of their own."""
 
 import ctypes.util
 import importlib.util
@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from wks_segment.batch import Batch, Job, Limits, Program, key_of
+from wks_segment.batch import Batch, Job, Limits, Program, job_key
 
 HERE = Path(__file__).parent
 FAKE = Program((sys.executable, str(HERE / "fake_child.py")))
-"""Starts a child that does as its files say, see there."""
+"""Starts a fake child, which does what its input files say."""
 
 
 def pytest_collection_modifyitems(items):
@@ -23,19 +23,19 @@ def pytest_collection_modifyitems(items):
 
 @pytest.fixture
 def needs_bpy():
-    """Marks what starts real children."""
+    """Mark a test that starts real children."""
 
 
 @pytest.fixture
 def needs_rendering():
-    """Skips where Blender cannot draw without a window."""
+    """Skip a test where Blender cannot render without a window."""
     if sys.platform == "linux" and not ctypes.util.find_library("EGL"):
-        pytest.skip("Blender draws without a window through EGL, which is not installed (libegl1, libgl1-mesa-dri)")
+        pytest.skip("Blender renders without a window through EGL, which is not installed (libegl1, libgl1-mesa-dri)")
 
 
 @pytest.fixture
 def batch(tmp_path):
-    """A function that makes a batch of files with these texts, for fake children."""
+    """A function that makes a batch of files with given texts, for fake children."""
 
     def make(texts, settings=(), outputs=None, **changes):
         jobs = []
@@ -44,9 +44,9 @@ def batch(tmp_path):
             path.parent.mkdir(exist_ok=True)
             if not path.exists() or path.read_text() != text:
                 path.write_text(text)
-            named = outputs or {"--out": "{}.txt"}
-            key = key_of(path, settings)
-            files = {option: pattern.format(name) for option, pattern in named.items()}
+            patterns = outputs or {"--out": "{}.txt"}
+            key = job_key(path, settings)
+            files = {option: pattern.format(name) for option, pattern in patterns.items()}
             jobs.append(Job(str(path), name, "copy", tuple(settings), files, key))
         values = {"folder": tmp_path / "out", "program": FAKE, "processes": 2, "limits": Limits(20.0)}
         return Batch(jobs=jobs, **(values | changes))

@@ -1,6 +1,6 @@
-"""A child in the place of Blender, started at once: does with a file what the file says.
+"""A fake child without Blender, which starts fast: the text of an input file says what to do with it.
 
-Loads the module that serves calls by itself, without all that the package imports.
+It loads the module `worker_main` alone, without the imports of the package.
 """
 
 import importlib.util
@@ -9,10 +9,10 @@ import sys
 import time
 from pathlib import Path
 
-CHILD = Path(__file__).resolve().parents[2] / "wks_segment" / "batch" / "worker_main.py"
-spec = importlib.util.spec_from_file_location("child", CHILD)
-child = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(child)
+WORKER_MAIN = Path(__file__).resolve().parents[2] / "wks_segment" / "batch" / "worker_main.py"
+spec = importlib.util.spec_from_file_location("worker_main", WORKER_MAIN)
+worker_main = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(worker_main)
 calls = []
 
 
@@ -29,21 +29,21 @@ def run(arguments):
     if text.startswith("sleep"):
         time.sleep(float(text.split()[1]))
     if text == "eat":
-        eaten = bytearray(b"x" * 600_000_000)
+        data = bytearray(b"x" * 600_000_000)
         time.sleep(60)
-        del eaten
+        del data
     if text == "refuse":
-        return child.Answer(None, f"{source}: there is no mesh in this file")
+        return worker_main.Answer(None, f"{source}: there is no mesh in this file")
     if text == "raise":
         raise RuntimeError("unforeseen")
     for argument in rest:
         if argument.startswith("--out"):
             Path(argument.partition("=")[2]).write_text(f"{text} {os.getpid()} {len(calls)}")
         if argument == "--beside":
-            beside = next(each.partition("=")[2] for each in rest if each.startswith("--out"))
+            beside = next(option.partition("=")[2] for option in rest if option.startswith("--out"))
             Path(beside).with_suffix(".mtl").write_text("beside")
-    return child.Answer({"segments": 3, "warnings": ["<a> warning"], "other": float("nan")})
+    return worker_main.Answer({"segments": 3, "warnings": ["<a> warning"], "other": float("nan")})
 
 
 print("a greeting", flush=True)
-sys.exit(child.serve(Path(sys.argv[1]), run))
+sys.exit(worker_main.serve(Path(sys.argv[1]), run))

@@ -1,36 +1,36 @@
-"""When a file counts as done: not if anything that enters its result differs."""
+"""Keys of jobs, which differ if anything that the result depends on differs, and lines of the log."""
 
 import os
 
-from wks_segment.batch import Outcome, content_of, key_of
+from wks_segment.batch import Outcome, hash_models, job_key
 
 
-def test_a_key_is_of_path_state_and_settings(tmp_path):
+def test_a_key_depends_on_file_and_settings(tmp_path):
     path = tmp_path / "a.obj"
     path.write_text("v 0 0 0")
-    key = key_of(path, ["learn", "--segments=4"])
-    assert key_of(path, ["learn", "--segments=4"]) == key
-    assert key_of(path, ["learn", "--segments=5"]) != key
+    key = job_key(path, ["learn", "--segments=4"])
+    assert job_key(path, ["learn", "--segments=4"]) == key
+    assert job_key(path, ["learn", "--segments=5"]) != key
     os.utime(path, (1, 1))
-    assert key_of(path, ["learn", "--segments=4"]) != key
+    assert job_key(path, ["learn", "--segments=4"]) != key
 
 
-def test_the_content_of_a_folder_is_that_of_its_models(tmp_path):
+def test_the_hash_models_a_folder_is_that_of_its_models(tmp_path):
     (tmp_path / "a.json").write_text("one")
-    content = content_of(tmp_path)
+    content = hash_models(tmp_path)
     (tmp_path / "report.html").write_text("written by a batch")
-    assert content_of(tmp_path) == content
+    assert hash_models(tmp_path) == content
     (tmp_path / "b.json").write_text("two")
-    assert content_of(tmp_path) != content
-    assert content_of(tmp_path / "a.json") == content
+    assert hash_models(tmp_path) != content
+    assert hash_models(tmp_path / "a.json") == content
 
 
-def test_a_line_is_read_again_and_half_a_line_is_none():
+def test_a_line_is_read_again_and_an_incomplete_one_is_skipped():
     outcome = Outcome("/in/a.obj", "a", "key", "done", outputs={"--model": "ä.json"}, result={"score": float("inf")})
-    line = outcome.line()
+    line = outcome.to_line()
     assert "\n" not in line
-    assert Outcome.of_line(line) == Outcome(
+    assert Outcome.from_line(line) == Outcome(
         "/in/a.obj", "a", "key", "done", outputs={"--model": "ä.json"}, result={"score": None}
     )
     for damaged in (line[:-9], "", "[]", '{"input": 3}', "null"):
-        assert Outcome.of_line(damaged) is None
+        assert Outcome.from_line(damaged) is None

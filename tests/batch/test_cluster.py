@@ -1,4 +1,4 @@
-"""Many machines: a real scheduler and two workers on this one, one of which is killed in the middle."""
+"""Batches with Dask: a real scheduler and two workers on this machine, one of which is killed during the batch."""
 
 import json
 import os
@@ -8,9 +8,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from command_line import QUICK, quiet, run, start, wait_for_lines, write
+from command_line import QUICK, run, start, wait_for_lines, write
 
 from wks_segment.batch import BatchError
+from wks_segment.core.progress import Progress
 
 ROOT = Path(__file__).resolve().parents[2]
 FILES = 6
@@ -18,20 +19,20 @@ distributed = pytest.importorskip("distributed")
 
 
 def started(*arguments, until, **environment):
-    """A process of Dask, and what matched in what it printed."""
+    """Start a process of Dask; return it and the text that matches `until` in what it prints."""
     process = subprocess.Popen(
         [sys.executable, "-m", "distributed.cli.dask_" + arguments[0], *arguments[1:]], text=True, cwd=ROOT,
         env={**os.environ, "PYTHONPATH": str(ROOT), **environment}, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
     )  # fmt: skip
     for line in process.stderr:
-        if found := re.search(until, line):
-            return process, found[0]
+        if match := re.search(until, line):
+            return process, match[0]
     raise AssertionError(f"{arguments}: ended with {process.wait()}")
 
 
 @pytest.fixture
 def cluster():
-    """The address of a scheduler, and its two workers."""
+    """Address of a scheduler, and its two workers."""
     processes = []
     try:
         scheduler, address = started(
@@ -65,34 +66,34 @@ def test_nothing_is_lost_when_a_worker_dies(cluster, tmp_path, needs_bpy):
     )
     wait_for_lines(out, 2, process)
     workers[0].kill()
-    printed, said = process.communicate(timeout=120)
-    result = json.loads(printed)
-    assert (process.returncode, result["files"], result["done"]) == (1, FILES + 1, FILES), said
+    output, messages = process.communicate(timeout=120)
+    result = json.loads(output)
+    assert (process.returncode, result["files"], result["done"]) == (1, FILES + 1, FILES), messages
     assert list(result["failed"]) == [str(inputs / "broken.glb")]
     alone = tmp_path / "alone.json"
     assert run("learn", inputs / f"{FILES - 1}.obj", "--model", alone, *QUICK)[0] == 0
-    assert alone.read_bytes() == (out / f"{FILES - 1}.json").read_bytes(), "the same as on one machine"
+    assert alone.read_bytes() == (out / f"{FILES - 1}.json").read_bytes(), "not the same model as without a cluster"
     assert not (out / ".unfinished").exists()
 
 
-def test_a_scheduler_that_is_not_there_is_named(batch, monkeypatch):
+def test_a_scheduler_that_does_not_answer_is_named(batch, monkeypatch):
     monkeypatch.setattr("wks_segment.batch.cluster.CONNECT_SECONDS", 1)
     with pytest.raises(BatchError, match=r"tcp://127\.0\.0\.1:9: no Dask scheduler answers"):
-        batch({"a": "one"}, scheduler="tcp://127.0.0.1:9").run(quiet)
-    assert batch({"a": "one"}).run(quiet)["done"] == 1
+        batch({"a": "one"}, scheduler="tcp://127.0.0.1:9").run(Progress())
+    assert batch({"a": "one"}).run(Progress())["done"] == 1
 
 
-def test_without_dask_it_is_said_what_to_install(batch, monkeypatch):
+def test_without_dask_the_message_says_what_to_install(batch, monkeypatch):
     monkeypatch.setattr("wks_segment.batch.batch_run.find_spec", lambda name: None)
     with pytest.raises(BatchError, match=r"--scheduler needs Dask.*pip install"):
-        batch({"a": "one"}, scheduler="tcp://127.0.0.1:9").run(quiet)
+        batch({"a": "one"}, scheduler="tcp://127.0.0.1:9").run(Progress())
 
 
-def test_a_file_that_costs_one_worker_after_the_other_is_given_up(batch):
+def test_a_file_on_which_several_workers_died_is_given_up(batch):
     from wks_segment.batch.cluster import _lost
 
     (job,) = batch({"a": "one"}).jobs
     worker = type("State", (), {"address": "tcp://somewhere"})()
     outcome = _lost(job, distributed.KilledWorker(job.key, worker, 3))
     assert not outcome.done
-    assert "each worker that began it died" in outcome.reason
+    assert "each worker that started it died" in outcome.reason

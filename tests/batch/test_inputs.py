@@ -1,10 +1,10 @@
-"""Which files a batch takes, and that no two results have one name."""
+"""Input files of a batch, and unique names of their results."""
 
 from pathlib import Path
 
 import pytest
 
-from wks_segment.batch import BatchError, inputs_of, names_of
+from wks_segment.batch import BatchError, find_inputs, result_names
 
 KNOWN = (".obj", ".glb")
 
@@ -19,50 +19,60 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def found(given, folder, known=KNOWN):
-    inputs = inputs_of(given, known, Path("out"))
-    return {path.relative_to(folder).as_posix(): name for (path, _), name in zip(inputs, names_of(inputs), strict=True)}
+def names(arguments, folder, known=KNOWN):
+    inputs = find_inputs(arguments, known, Path("out"))
+    return {
+        path.relative_to(folder).as_posix(): name for (path, _), name in zip(inputs, result_names(inputs), strict=True)
+    }
 
 
-def test_a_folder_means_all_files_in_it_but_results(folder):
-    assert found(["."], folder) == {
+def test_a_folder_stands_for_all_files_in_it_except_results(folder):
+    assert names(["."], folder) == {
         "a.obj": "a", "b.GLB": "b", "more/a.obj": "more/a", "more/deep/c.obj": "more/deep/c",
     }  # fmt: skip
 
 
-def test_a_pattern_means_what_fits(folder):
-    assert found(["more/**/*.obj"], folder) == {"more/a.obj": "a", "more/deep/c.obj": "deep/c"}
-    assert found(["[ab].*"], folder) == {"a.obj": "a", "b.GLB": "b"}
+def test_a_pattern_stands_for_matching_files(folder):
+    assert names(["more/**/*.obj"], folder) == {"more/a.obj": "a", "more/deep/c.obj": "deep/c"}
+    assert names(["[ab].*"], folder) == {"a.obj": "a", "b.GLB": "b"}
 
 
-def test_a_file_is_taken_as_it_is_and_once(folder):
-    assert found(["a.obj", "./more/../a.obj", "notes.txt"], folder) == {"a.obj": "a", "notes.txt": "notes"}
+def test_a_file_is_taken_once_whatever_its_format(folder):
+    assert names(["a.obj", "./more/../a.obj", "notes.txt"], folder) == {"a.obj": "a", "notes.txt": "notes"}
 
 
-def test_files_of_one_name_keep_their_folders(folder):
-    assert found(["more/a.obj", "more/deep/c.obj"], folder) == {"more/a.obj": "a", "more/deep/c.obj": "c"}
-    assert found(["a.obj", "more/a.obj", "b.GLB"], folder) == {"a.obj": "a", "more/a.obj": "more/a", "b.GLB": "b"}
+def test_files_with_the_same_name_keep_their_folders(folder):
+    assert names(["more/a.obj", "more/deep/c.obj"], folder) == {"more/a.obj": "a", "more/deep/c.obj": "c"}
+    assert names(["a.obj", "more/a.obj", "b.GLB"], folder) == {
+        "a.obj": "a",
+        "more/a.obj": "more/a",
+        "b.GLB": "b",
+    }
     (folder / "else").mkdir()
     (folder / "else" / "a.obj").touch()
-    assert found(["else/a.obj", "more/a.obj"], folder) == {"else/a.obj": "else/a", "more/a.obj": "more/a"}
+    assert names(["else/a.obj", "more/a.obj"], folder) == {"else/a.obj": "else/a", "more/a.obj": "more/a"}
 
 
-def test_files_of_one_name_but_for_their_format_keep_it(folder):
+def test_files_that_differ_in_suffix_only_keep_it(folder):
     (folder / "a.glb").touch()
-    assert found(["a.obj", "a.glb"], folder) == {"a.obj": "a.obj", "a.glb": "a.glb"}
+    assert names(["a.obj", "a.glb"], folder) == {"a.obj": "a.obj", "a.glb": "a.glb"}
 
 
-def test_upper_and_lower_case_are_one_name(folder):
+def test_names_that_differ_in_case_only_count_as_equal(folder):
     (folder / "more" / "A.obj").touch()
     (folder / "A.obj").touch()
-    names = found(["a.obj", "A.obj", "more/A.obj"], folder).values()
-    assert sorted(names) == ["A.obj 2", "a.obj", "more/A"]
+    found = names(["a.obj", "A.obj", "more/A.obj"], folder).values()
+    assert sorted(found) == ["A.obj 2", "a.obj", "more/A"]
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
-    [("c.obj", "there is no such file or folder"), ("*.fbx", "no file in it"), ("out", "no file in it")],
+    ("argument", "message"),
+    [
+        ("c.obj", "there is no such file or folder"),
+        ("*.fbx", "no file in it can be read"),
+        ("out", "no file in it can be read"),
+    ],
 )
-def test_what_names_no_file_is_refused(folder, given, said):
-    with pytest.raises(BatchError, match=said):
-        found([given], folder)
+def test_an_argument_without_files_is_refused(folder, argument, message):
+    with pytest.raises(BatchError, match=message):
+        names([argument], folder)

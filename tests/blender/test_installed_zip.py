@@ -1,8 +1,8 @@
-"""The ZIP that artists install: what `scripts/build_zip.py` refuses, and the way from install to removal.
+"""The ZIP that artists install: faults that `scripts/build_zip.py` must find, and installing, using and removing it.
 
-The install test takes the newest `dist/wks_segment-*-linux-x64.zip`, or the one that WKS_SEGMENT_ZIP names.
-It runs in a process of its own, with an empty profile and a Python that knows only bpy and its requirements:
-SciPy and scikit-learn can come from nowhere but the ZIP.
+The install test uses the newest `dist/wks_segment-*-linux-x64.zip`, or the one that WKS_SEGMENT_ZIP names.
+It runs in a process of its own, with an empty profile and a Python that has only bpy and its requirements, so that
+SciPy, scikit-learn and psutil can come only from the ZIP.
 """
 
 import importlib.metadata
@@ -32,9 +32,12 @@ def load_build_zip():
 
 build_zip = load_build_zip()
 PYTHONS = ("3.11", "3.13")
-PURE = [f"{name}-{version}-py3-none-any.whl" for name, version in build_zip.PURE.items()]
-LINUX_WHEELS = PURE + [
-    f"{name}-{version}-{tag}-{tag}-manylinux_2_17_x86_64.manylinux2014_x86_64.whl"
+LINUX = "manylinux_2_17_x86_64.manylinux2014_x86_64"
+LINUX_WHEELS = [
+    f"{name}-{version}-{f'cp36-abi3-{LINUX}' if name == 'psutil' else 'py3-none-any'}.whl"
+    for name, version in build_zip.ANY_PYTHON.items()
+] + [
+    f"{name}-{version}-{tag}-{tag}-{LINUX}.whl"
     for python, tag in (("3.11", "cp311"), ("3.13", "cp313"))
     for name, version in build_zip.COMPILED[python].items()
 ]
@@ -42,7 +45,7 @@ SCIPY_313 = next(name for name in LINUX_WHEELS if name.startswith("scipy") and "
 
 
 def write_zip(path, packed, listed=None, files=(), platforms=("linux-x64",)):
-    """A ZIP with empty wheels; `listed` is what its manifest says, by default the truth."""
+    """Write a ZIP with empty wheels, of which its manifest lists `listed`, by default all."""
     wheels = [f"./wheels/{name}" for name in (packed if listed is None else listed)]
     with zipfile.ZipFile(path, "w") as archive:
         manifest = f"platforms = {list(platforms)}\nwheels = {wheels}\n"
@@ -68,6 +71,8 @@ def test_complete_zip_has_no_fault(tmp_path):
         ("scipy-1.15.3-cp311-cp311-win_amd64.whl", "does not suit linux-x64"),
         ("scipy-1.15.3-cp313-cp313t-manylinux_2_17_x86_64.whl", "does not suit linux-x64"),
         ("cholespy-2.2.0-cp312-cp312-manylinux_2_34_x86_64.whl", "does not suit linux-x64"),
+        ("psutil-7.2.2-cp314-abi3-manylinux_2_17_x86_64.whl", "does not suit linux-x64"),
+        ("psutil-7.3.0-cp36-abi3-manylinux_2_17_x86_64.whl", "2 wheels of psutil suit linux-x64, Python 3.11"),
         ("not_a_wheel.whl", "does not suit linux-x64"),
     ],
 )
@@ -78,15 +83,14 @@ def test_wheel_that_must_not_be_inside(tmp_path, added, fault):
 
 def test_platform_without_a_wheel(tmp_path):
     faults = faults_of(tmp_path, [name for name in LINUX_WHEELS if name != SCIPY_313])
-    assert faults == ["linux-x64 lacks a wheel of scipy for Python 3.13"]
+    assert faults == ["no wheel of scipy for linux-x64, Python 3.13"]
 
 
 def test_wheel_of_another_platform_does_not_count(tmp_path):
-    linux = "manylinux_2_17_x86_64.manylinux2014_x86_64"
-    faults = faults_of(tmp_path, [name.replace(linux, "win_amd64") for name in LINUX_WHEELS])
-    for package in ("scipy", "scikit_learn"):
+    faults = faults_of(tmp_path, [name.replace(LINUX, "win_amd64") for name in LINUX_WHEELS])
+    for package in ("scipy", "scikit_learn", "psutil"):
         for python in PYTHONS:
-            assert f"linux-x64 lacks a wheel of {package} for Python {python}" in faults
+            assert f"no wheel of {package} for linux-x64, Python {python}" in faults
 
 
 @pytest.mark.parametrize(("version", "runs"), [("12_0", True), ("14_0", False)])
@@ -97,12 +101,12 @@ def test_wheel_for_a_newer_macos(version, runs):
 
 def test_listed_wheel_is_missing(tmp_path):
     faults = faults_of(tmp_path, LINUX_WHEELS, listed=[*LINUX_WHEELS, "narwhals-2.0.0-py3-none-any.whl"])
-    assert faults == ["the manifest lists wheels/narwhals-2.0.0-py3-none-any.whl, which the ZIP lacks"]
+    assert faults == ["the manifest lists wheels/narwhals-2.0.0-py3-none-any.whl, which is not in the ZIP"]
 
 
 def test_packed_wheel_is_not_listed(tmp_path):
     faults = faults_of(tmp_path, LINUX_WHEELS, listed=[name for name in LINUX_WHEELS if name != SCIPY_313])
-    assert faults == [f"the ZIP holds wheels/{SCIPY_313}, which the manifest does not list"]
+    assert faults == [f"the ZIP contains wheels/{SCIPY_313}, which the manifest does not list"]
 
 
 def test_manifest_of_several_platforms(tmp_path):
@@ -111,12 +115,12 @@ def test_manifest_of_several_platforms(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "stray", ["wks_segment/__pycache__/a.pyc", "tests/core/test_mesh.py", "docs/notes.docx", ".gitignore"]
+    "name", ["wks_segment/__pycache__/a.pyc", "tests/core/test_mesh.py", "docs/notes.docx", ".gitignore"]
 )
-def test_file_that_slipped_in(tmp_path, stray):
-    faults = faults_of(tmp_path, LINUX_WHEELS, files=[stray])
+def test_file_that_does_not_belong_in_the_zip(tmp_path, name):
+    faults = faults_of(tmp_path, LINUX_WHEELS, files=[name])
     assert len(faults) == 1
-    assert stray in faults[0]
+    assert name in faults[0]
 
 
 def test_failed_build_says_why_and_returns_1(tmp_path, capsys):
@@ -163,14 +167,17 @@ def bare_site(tmp_path):
 
 
 def use_extension(site, zip_path, profile):
-    """Install, learn, clear, disable. Its text is what the other process runs, so it brings its imports."""
+    """Install the extension, learn, clear and disable it.
+
+    The source of this function is run by another process, so it contains its imports.
+    """
     import importlib.util
     import sys
     from pathlib import Path
 
     sys.path.append(site)
-    for name in ("scipy", "sklearn", "joblib", "threadpoolctl"):
-        assert importlib.util.find_spec(name) is None, f"{name} is there before the ZIP"
+    for name in ("scipy", "sklearn", "joblib", "threadpoolctl", "psutil"):
+        assert importlib.util.find_spec(name) is None, f"{name} is installed already, without the ZIP"
 
     import bpy
     import numpy as np
@@ -180,17 +187,18 @@ def use_extension(site, zip_path, profile):
     assert module in bpy.context.preferences.addons, "the extension is not enabled"
 
     import joblib
+    import psutil
     import scipy
     import sklearn
     import threadpoolctl
 
-    for package in (scipy, sklearn, joblib, threadpoolctl):
-        assert Path(package.__file__).is_relative_to(profile), f"{package.__file__} is not of the ZIP"
+    for package in (scipy, sklearn, joblib, threadpoolctl, psutil):
+        assert Path(package.__file__).is_relative_to(profile), f"{package.__file__} is not from the ZIP"
     assert Path(np.__file__).is_relative_to(site), f"{np.__file__} is not the environment's NumPy"
 
     bpy.ops.wm.read_homefile(use_empty=True)
     bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=32)
-    # Copies of one: Blender numbers the faces of each new sphere in another order.
+    # Copies, since Blender numbers the faces of each new sphere in another order.
     poses = [bpy.context.object]
     for _ in range(2):
         poses.append(poses[0].copy())
@@ -222,7 +230,7 @@ def use_extension(site, zip_path, profile):
     bpy.context.preferences.addons[module].preferences.model_folder = profile
     assert bpy.ops.wks_segment.save_model(filepath=str(Path(profile) / "shared.json")) == {"FINISHED"}
     assert bpy.ops.wks_segment.rank() == {"FINISHED"}
-    assert "shared" in [item.name for item in settings.ranking], "the model folder of the preferences is not seen"
+    assert "shared" in [item.name for item in settings.ranking], "the model folder of the preferences is not used"
 
     assert bpy.ops.wks_segment.clear() == {"FINISHED"}
     assert all("wks_segment" not in pose.data.attributes for pose in poses), "clear left an attribute"
@@ -232,8 +240,8 @@ def use_extension(site, zip_path, profile):
     assert not hasattr(bpy.types.Scene, "wks_segment"), "unregister left the settings behind"
 
 
-# Blender can crash or hang when Python ends in order, so the process leaves by os._exit, whatever happened.
-LEAVE_AT_ONCE = """
+# Blender can crash or hang at a normal exit of Python, so the process always ends with os._exit.
+RUN_AND_EXIT = """
 
 import os, sys, traceback
 code = 1
@@ -253,7 +261,7 @@ def test_install_learn_clear_and_disable(zip_path, bare_site, tmp_path):
     profile = tmp_path / "profile"
     profile.mkdir()
     program = tmp_path / "use_extension.py"
-    program.write_text(inspect.getsource(use_extension) + LEAVE_AT_ONCE, encoding="utf-8")
+    program.write_text(inspect.getsource(use_extension) + RUN_AND_EXIT, encoding="utf-8")
     done = subprocess.run(
         # -I and -S: no PYTHONPATH, no site-packages
         [sys.executable, "-I", "-S", str(program), str(bare_site), str(zip_path), str(profile)],
@@ -266,4 +274,4 @@ def test_install_learn_clear_and_disable(zip_path, bare_site, tmp_path):
         check=False,
     )
     assert done.returncode == 0, done.stdout
-    shutil.rmtree(profile)  # 100 MB of wheels, of use only after a failure
+    shutil.rmtree(profile)  # 100 MB of wheels, which only a failure would need

@@ -1,18 +1,18 @@
-"""Many files, each a job of its own in a child process; on one machine or many. Knows no Blender, nor imports it.
+"""Batches: the command line for many files, each a job in a child process, on one machine or many.
 
-The children run the command line of `wks_segment.blender`, which is all that this room knows of it.
+Knows nothing of Blender and does not import it: the children run the command line of `wks_segment.blender`.
 """
 
-from .batch_run import Batch, merged
+from .batch_run import Batch, merge_logs
 from .errors import BatchError
-from .inputs import inputs_of, names_of
-from .job import Job, Outcome, content_of, key_of
+from .inputs import find_inputs, result_names
+from .job import Job, Outcome, hash_models, job_key
 from .limits import Limits
 from .worker_main import Answer, serve
-from .worker_process import COMMAND, Program, python_program
+from .worker_process import CHILD_COMMAND, Program, python_program
 
 __all__ = [
-    "COMMAND",
+    "CHILD_COMMAND",
     "Answer",
     "Batch",
     "BatchError",
@@ -20,11 +20,11 @@ __all__ = [
     "Limits",
     "Outcome",
     "Program",
-    "content_of",
-    "inputs_of",
-    "key_of",
-    "merged",
-    "names_of",
+    "find_inputs",
+    "hash_models",
+    "job_key",
+    "merge_logs",
     "python_program",
+    "result_names",
     "serve",
 ]

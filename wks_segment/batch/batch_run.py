@@ -1,4 +1,4 @@
-"""A batch from its plan to its report: what is to be done, what was done before, what came of it."""
+"""One run of a batch: select the jobs that are not done, run them, log the results and write the report."""
 
 from __future__ import annotations
 
@@ -7,49 +7,49 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from ..core.progress import Progress
 from . import local_pool
 from .errors import BatchError
-from .html_report import write_page
+from .html_report import write_report
 from .job import Job, Outcome
-from .limits import Limits, can_watch_memory
-from .results_log import Record, read_record, record_name, records_in, write_record
+from .limits import Limits
+from .results_log import ResultsLog, find_logs, log_name, read_log, read_logs, write_log
 from .worker_process import Program
 
-UNFINISHED = ".unfinished"
-"""Folder for results that are being written."""
-Progress = Callable[[str, float], None]
+UNFINISHED_FOLDER = ".unfinished"
+"""Folder, within that of the batch, in which results are written before they are moved to their place."""
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Jobs, and how they are to be done.
+    """Jobs, and how they are run.
 
     Attributes
     ----------
     folder : path
-        For results, list and report.
+        Folder for results, log and report.
     jobs
-        Each writes other files.
+        No two of them write the same file.
     program : Program
-        Starts a child of this machine.
+        Starts a child process on this machine.
     processes : int
-        Children at once on this machine.
+        Number of child processes on this machine that run at once.
     limits : Limits
     scheduler : str or None
-        Address of a Dask scheduler, whose workers do the jobs.
+        Address of a Dask scheduler, whose workers run the jobs.
     part : (i, n) or None
-        Do only each n-th job, from the i-th on, with a list of their own.
+        Run only every n-th job, beginning with the i-th, and keep a log of these alone.
     resume : bool
-        Go on with what is in the folder.
-    again : bool
-        Also do what failed before.
+        Continue the batch in the folder.
+    retry : bool
+        With `resume`, run jobs that failed again.
     """
 
     folder: Path
@@ -60,167 +60,176 @@ class Batch:
     scheduler: str | None = None
     part: tuple[int, int] | None = None
     resume: bool = False
-    again: bool = False
+    retry: bool = False
 
     def run(self, progress: Progress) -> dict[str, Any]:
-        """Do what is to be done; write the list and the report.
+        """Run the jobs that are not done yet; write the log and the report.
+
+        Returns
+        -------
+        dict
+            Number of files, of those that are done, and of those that were run now; input and reason of those that
+            failed; paths of the log ("list") and the report.
 
         Raises
         ------
         BatchError
-            If there is something else in the folder, if what would be written is there already, if another batch is
-            at work there, if no child can be started, or if the user ends it.
+            If the folder contains anything else, if a file that would be written exists already, if another batch is
+            running in the folder, if no child process can be started, or if the user ends the batch.
         """
         self._check_folder()
-        self._check_means()
+        self._check_requirements()
         self.folder.mkdir(parents=True, exist_ok=True)
-        mine = self.jobs if self.part is None else self.jobs[self.part[0] - 1 :: self.part[1]]
-        name = record_name(self.part)
-        # One for each list, since parts of a batch run at the same time.
-        unfinished = self.folder / UNFINISHED / name
-        with Record(self.folder / name) as record:
-            for outcome in record.outcomes.values():  # the batch may have been killed between both
-                self._put_in_place(outcome, unfinished)
+        jobs = self.jobs if self.part is None else self.jobs[self.part[0] - 1 :: self.part[1]]
+        name = log_name(self.part)
+        # A folder for each log, since parts of a batch run at the same time.
+        unfinished = self.folder / UNFINISHED_FOLDER / name
+        with ResultsLog(self.folder / name) as log:
+            for outcome in log.outcomes.values():  # a batch may have been killed before it moved these results
+                self._move_results(outcome, unfinished)
             shutil.rmtree(unfinished, ignore_errors=True)
-            waiting = [job for job in mine if not self._known(job, record.outcomes.get(job.input))]
-            self._check_files(waiting)
+            waiting = [job for job in jobs if not self._is_finished(job, log.outcomes.get(job.input))]
+            self._check_outputs(waiting)
             unfinished.mkdir(parents=True)
             try:
-                self._do(waiting, record, len(mine), unfinished, progress)
+                self._run_jobs(waiting, log, len(jobs), unfinished, progress)
             finally:
                 shutil.rmtree(unfinished, ignore_errors=True)
-                if not any((self.folder / UNFINISHED).iterdir()):
-                    (self.folder / UNFINISHED).rmdir()
-                known = [record.outcomes[job.input] for job in mine if job.input in record.outcomes]
-                if known:
-                    page = write_page(self.folder, self._all(known), len(self.jobs))
-                else:  # it did not even begin: the same command may begin it
-                    record.path.unlink()
-        failed = {outcome.input: outcome.reason for outcome in known if not outcome.done}
-        return {
-            "files": len(mine), "done": len(known) - len(failed), "now": len(waiting), "failed": failed,
-            "list": str(record.path), "report": str(page),
-        }  # fmt: skip
+                if not any((self.folder / UNFINISHED_FOLDER).iterdir()):
+                    (self.folder / UNFINISHED_FOLDER).rmdir()
+                finished = [log.outcomes[job.input] for job in jobs if job.input in log.outcomes]
+                if finished:
+                    report = write_report(self.folder, self._with_other_parts(finished), len(self.jobs))
+                else:  # no job was finished: leave no log, so that the same command may start the batch again
+                    log.path.unlink()
+        return _summary(finished, len(jobs), len(waiting), log.path, report)
 
-    def _do(self, jobs: Sequence[Job], record: Record, of: int, unfinished: Path, progress: Progress) -> None:
-        """Do jobs; what comes of each is in the list as soon as it is there."""
-        begun, failures, before = time.monotonic(), 0, of - len(jobs)
-        done = before
-        progress(_said(done, of, 0, None, ""), done / of)
-        with _ended_by_signals(), closing(self._outcomes(jobs, unfinished)) as outcomes:
+    def _run_jobs(
+        self, jobs: Sequence[Job], log: ResultsLog, n_files: int, unfinished: Path, progress: Progress
+    ) -> None:
+        """Run jobs; the outcome of each is logged at once."""
+        n_before = n_done = n_files - len(jobs)
+        begun, n_failed = time.monotonic(), 0
+        progress(n_done / n_files, _progress_text(n_done, n_files))
+        with _interrupted_by_signals(), closing(self._outcomes(jobs, unfinished)) as outcomes:
             try:
                 for outcome in outcomes:
-                    # The list before the files: what is there without being in it is not ours.
-                    record.add(outcome)
-                    self._put_in_place(outcome, unfinished)
-                    failures += not outcome.done
-                    done += 1
-                    left = (time.monotonic() - begun) / (done - before) * (of - done)
-                    progress(_said(done, of, failures, left, outcome.name), done / of)
+                    # First the log, then the files: a file that is in no log counts as somebody else's.
+                    log.add(outcome)
+                    self._move_results(outcome, unfinished)
+                    n_failed += not outcome.done
+                    n_done += 1
+                    seconds_left = (time.monotonic() - begun) / (n_done - n_before) * (n_files - n_done)
+                    text = _progress_text(n_done, n_files, n_failed, seconds_left)
+                    progress(n_done / n_files, f"{text}: {outcome.name}")
             except KeyboardInterrupt:
                 raise BatchError(
-                    f"ended by the user with {done} of {of} files done: go on with the same command and --resume"
+                    f"ended by the user with {n_done} of {n_files} files done: continue with the same command and "
+                    "--resume"
                 ) from None
 
     def _outcomes(self, jobs: Sequence[Job], unfinished: Path) -> Generator[Outcome]:
+        """Outcome of each job as soon as it has ended, in any order."""
         if self.scheduler is None or not jobs:
-            return local_pool.outcomes(jobs, self.program, self.processes, self.limits, unfinished)
+            return local_pool.run_jobs(jobs, self.program, self.processes, self.limits, unfinished)
         from . import cluster
 
-        return cluster.outcomes(jobs, self.scheduler, self.limits, unfinished.resolve())
+        return cluster.run_jobs(jobs, self.scheduler, self.limits, unfinished.resolve())
 
-    def _check_means(self) -> None:
-        """What is asked for can be had here."""
+    def _check_requirements(self) -> None:
+        if self.part is not None and self.part[0] > len(self.jobs):
+            i, n = self.part
+            raise BatchError(f"--part {i}/{n}: there are only {len(self.jobs)} files")
         if self.scheduler is not None and find_spec("distributed") is None:
             raise BatchError(
                 f'--scheduler needs Dask, which is not installed in {sys.executable}: pip install "wks-segment[dask]", '
                 "here and on the workers"
             )
-        if self.scheduler is None and self.limits.memory is not None and not can_watch_memory():
-            raise BatchError("--memory-limit needs Linux, or the package psutil")
 
-    def _put_in_place(self, outcome: Outcome, unfinished: Path) -> None:
-        """Move results to where they belong, as far as they are not there yet."""
+    def _move_results(self, outcome: Outcome, unfinished: Path) -> None:
+        """Move the results of a job that are still in their temporary folder to their place."""
         for path in outcome.outputs.values():
             written = unfinished / outcome.place / path
             if outcome.place and written.is_file():
                 (self.folder / path).parent.mkdir(parents=True, exist_ok=True)
                 written.replace(self.folder / path)
 
-    def _known(self, job: Job, outcome: Outcome | None) -> bool:
-        """Whether a job was done before, and its results are there."""
+    def _is_finished(self, job: Job, outcome: Outcome | None) -> bool:
+        """Whether a job needs no run: it was run with the same input and settings, and its results are still there."""
         if outcome is None or outcome.key != job.key:
             return False
         if not outcome.done:
-            return not self.again
+            return not self.retry
         return all((self.folder / path).is_file() for path in outcome.outputs.values())
 
     def _check_folder(self) -> None:
         if self.folder.exists() and not self.folder.is_dir():
-            raise BatchError(f"{self.folder}: this is a file, give the name of a folder")
-        there = self.folder.is_dir() and any(self.folder.iterdir())
-        if there and not self.resume:
+            raise BatchError(f"{self.folder}: this is a file; give the name of a folder")
+        used = self.folder.is_dir() and any(self.folder.iterdir())
+        if used and not self.resume:
             raise BatchError(
-                f"{self.folder}: the folder is not empty: take another one, or go on with the batch in it by --resume"
+                f"{self.folder}: the folder is not empty: take another one, or continue the batch in it with --resume"
             )
-        if there and not (records_in(self.folder) or (self.folder / UNFINISHED).is_dir()):
-            raise BatchError(f"{self.folder}: there are files in the folder, but no batch that could be resumed")
+        if used and not (find_logs(self.folder) or (self.folder / UNFINISHED_FOLDER).is_dir()):
+            raise BatchError(f"{self.folder}: there are files in the folder, but no batch that could be continued")
 
-    def _check_files(self, jobs: Sequence[Job]) -> None:
-        """Nothing is written over but what this batch wrote."""
-        known = [each for name in records_in(self.folder) for each in read_record(name).values()]
-        owner = {path: outcome.input for outcome in known for path in outcome.outputs.values()}
+    def _check_outputs(self, jobs: Sequence[Job]) -> None:
+        """Refuse to overwrite files, except those that this batch wrote for the same input."""
+        logged = [outcome for path in find_logs(self.folder) for outcome in read_log(path).values()]
+        owner = {path: outcome.input for outcome in logged for path in outcome.outputs.values()}
         for job in jobs:
             for path in job.outputs.values():
                 if owner.get(path, job.input) != job.input:
                     raise BatchError(
-                        f"{self.folder / path}: this is what came of {owner[path]}, and {job.input} would have the "
-                        "same name: take another --output for other inputs"
+                        f"{self.folder / path}: this is the result of {owner[path]}, and that of {job.input} would "
+                        "have the same name: take another --output for other inputs"
                     )
                 if path not in owner and (self.folder / path).exists():
                     raise BatchError(
-                        f"{self.folder / path}: the file is there, but not from this batch: move it away, or take "
+                        f"{self.folder / path}: the file exists and is not from this batch: move it away, or take "
                         "another --output"
                     )
 
-    def _all(self, mine: Sequence[Outcome]) -> list[Outcome]:
-        """What came of all files so far, those of other parts among them."""
-        if self.part is None:
-            return list(mine)
-        found: dict[str, Outcome] = {}
-        for path in records_in(self.folder):
-            found |= read_record(path)
-        return list(found.values())
+    def _with_other_parts(self, finished: Sequence[Outcome]) -> list[Outcome]:
+        """Outcomes of the whole batch so far, for which the logs of other parts are read."""
+        return list(finished) if self.part is None else list(read_logs(find_logs(self.folder)).values())
 
 
-def merged(folder: Path) -> dict[str, Any]:
-    """Put the lists of all parts into one, and write the report of all; the lists of parts stay.
+def merge_logs(folder: Path) -> dict[str, Any]:
+    """Merge the logs of all parts of a batch into one, and write the report; the logs of the parts stay.
+
+    Returns
+    -------
+    dict
+        As that of `Batch.run`.
 
     Raises
     ------
     BatchError
-        If there is no list.
+        If there is no log in the folder.
     """
-    paths = records_in(folder)
+    paths = find_logs(folder)
     if not paths:
         raise BatchError(f"{folder}: there is no batch in this folder")
-    found: dict[str, Outcome] = {}
-    for path in paths:
-        found |= read_record(path)
-    write_record(folder / record_name(None), found.values())
-    page = write_page(folder, found.values(), len(found))
-    failed = {outcome.input: outcome.reason for outcome in found.values() if not outcome.done}
+    outcomes = list(read_logs(paths).values())
+    merged = folder / log_name(None)
+    write_log(merged, outcomes)
+    report = write_report(folder, outcomes, len(outcomes))
+    return _summary(outcomes, len(outcomes), 0, merged, report)
+
+
+def _summary(outcomes: Sequence[Outcome], n_files: int, n_run: int, log: Path, report: Path) -> dict[str, Any]:
+    failed = {outcome.input: outcome.reason for outcome in outcomes if not outcome.done}
     return {
-        "files": len(found), "done": len(found) - len(failed), "now": 0, "failed": failed,
-        "list": str(folder / record_name(None)), "report": str(page),
+        "files": n_files, "done": len(outcomes) - len(failed), "now": n_run, "failed": failed,
+        "list": str(log), "report": str(report),
     }  # fmt: skip
 
 
-def _said(done: int, of: int, failures: int, left: float | None, name: str) -> str:
-    """How far it is."""
-    failed = f", {failures} failed" if failures else ""
-    rest = "" if left is None or done == of else f", {_duration(left)} left"
-    return f"{done} of {of}{failed}{rest}" + (f": {name}" if name else "")
+def _progress_text(n_done: int, n_files: int, n_failed: int = 0, seconds_left: float | None = None) -> str:
+    failed = f", {n_failed} failed" if n_failed else ""
+    left = "" if seconds_left is None or n_done == n_files else f", {_duration(seconds_left)} left"
+    return f"{n_done} of {n_files}{failed}{left}"
 
 
 def _duration(seconds: float) -> str:
@@ -230,15 +239,15 @@ def _duration(seconds: float) -> str:
 
 
 @contextmanager
-def _ended_by_signals() -> Iterator[None]:
-    """Ctrl+C, and a request to end, as KeyboardInterrupt: Blender has its own way with the first otherwise."""
+def _interrupted_by_signals() -> Iterator[None]:
+    """Raise KeyboardInterrupt on SIGINT (Ctrl+C) and SIGTERM; Blender would handle SIGINT in its own way."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    kinds = [signal.SIGINT, signal.SIGTERM]
-    before = [signal.signal(kind, signal.default_int_handler) for kind in kinds]
+    signals = [signal.SIGINT, signal.SIGTERM]
+    previous = [signal.signal(number, signal.default_int_handler) for number in signals]
     try:
         yield
     finally:
-        for kind, handler in zip(kinds, before, strict=True):
-            signal.signal(kind, signal.SIG_DFL if handler is None else handler)
+        for number, handler in zip(signals, previous, strict=True):
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)

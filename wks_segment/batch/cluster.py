@@ -1,7 +1,7 @@
-"""Jobs on many machines, by Dask: the same jobs in the same children, which the workers of a cluster look after.
+"""Run jobs on many machines with Dask, whose workers start the same child processes as a local batch.
 
-A worker that dies takes nothing with it: its jobs are done anew by others. All machines see the same files under the
-same paths. Only this module imports Dask, and it is imported only if a scheduler is given.
+If a worker dies, other workers run its jobs again. All machines must see the files under the same paths. Dask is
+imported only here, and this module is imported only if a scheduler is given.
 """
 
 from __future__ import annotations
@@ -17,26 +17,31 @@ from distributed import Client, KilledWorker, Worker, WorkerPlugin, as_completed
 from .errors import BatchError, EndedError
 from .job import Job, Outcome
 from .limits import Limits
-from .run_job import do
-from .worker_process import Child, python_program
+from .run_job import run_job
+from .worker_process import ChildProcess, python_program
 
 CONNECT_SECONDS = 10
+"""Time limit for the connection to the scheduler."""
 RETRIES = 2
-"""Times that a job is done anew after its worker could not even begin it, as where the folder is not mounted."""
+"""Number of times that a job is tried again after a worker could not start it, as where the folder is not mounted."""
 
 
-def outcomes(jobs: Sequence[Job], scheduler: str, limits: Limits, unfinished: Path) -> Generator[Outcome]:
-    """What comes of each job, as soon as it is there. To close the iterator ends all children.
+def run_jobs(jobs: Sequence[Job], scheduler: str, limits: Limits, unfinished: Path) -> Generator[Outcome]:
+    """Outcome of each job as soon as it has ended. Closing the generator ends all children.
 
     Parameters
     ----------
+    jobs
     scheduler : str
         Address of a Dask scheduler, `tcp://host:port`.
+    limits : Limits
+    unfinished : path
+        Folder in which results are written first, the same on all machines.
 
     Raises
     ------
     BatchError
-        If there is no scheduler.
+        If the scheduler does not answer.
     """
     try:
         client = Client(scheduler, timeout=CONNECT_SECONDS, set_as_default=False)
@@ -44,74 +49,72 @@ def outcomes(jobs: Sequence[Job], scheduler: str, limits: Limits, unfinished: Pa
         raise BatchError(f"{scheduler}: no Dask scheduler answers there: {error}") from error
     name = f"wks_segment-{uuid.uuid4().hex}"
     with client, client.as_current():
-        client.register_plugin(_Children(name, limits), name=name)
+        client.register_plugin(_ChildrenPlugin(name, limits), name=name)
         try:
             futures = {
                 client.submit(
-                    _do, job, limits.seconds, str(unfinished), name,
+                    _run_on_worker, job, limits.seconds, str(unfinished), name,
                     key=f"wks_segment-{job.key}-{uuid.uuid4().hex}", retries=RETRIES, pure=False,
                 ): job
                 for job in jobs
             }  # fmt: skip
-            # Forgotten as they come, or the scheduler would keep all of them.
             for future in as_completed(list(futures)):
                 job = futures.pop(future)
-                problem = future.exception()
-                yield future.result() if problem is None else _lost(job, problem)
-                future.release()
+                failure = future.exception()
+                yield future.result() if failure is None else _lost(job, failure)
+                future.release()  # or the scheduler would keep all results
         finally:
-            # What is at work ends with the children.
-            client.unregister_worker_plugin(name)
+            client.unregister_worker_plugin(name)  # this ends the children, and with them all running jobs
 
 
-def _do(job: Job, seconds: float, unfinished: str, plugin: str) -> Outcome:
-    """Runs on a worker, in one of its threads."""
+def _run_on_worker(job: Job, seconds: float, unfinished: str, plugin: str) -> Outcome:
+    """Run a job; called by Dask on a worker, in one of its threads."""
     children = get_worker().plugins[plugin]
-    assert isinstance(children, _Children)
-    return children.do(job, seconds, Path(unfinished))
+    assert isinstance(children, _ChildrenPlugin)
+    return children.run(job, seconds, Path(unfinished))
 
 
 def _lost(job: Job, error: BaseException) -> Outcome:
-    """A job that no worker finished."""
+    """Outcome of a job that no worker finished."""
     reason = f"no worker finished it: {type(error).__name__}: {error}".partition("\n")[0]
     if isinstance(error, KilledWorker):
-        reason = "each worker that began it died, and it is not tried again; do their machines have enough memory?"
+        reason = "each worker that started it died, so it is not tried again; do their machines have enough memory?"
     return Outcome(job.input, job.name, job.key, "failed", reason)
 
 
-class _Children(WorkerPlugin):
-    """The children of one worker, in a batch: a plugin of Dask, which sets it up on each worker that there is or comes.
+class _ChildrenPlugin(WorkerPlugin):
+    """Child processes of one Dask worker during a batch; Dask installs the plugin on each present or future worker.
 
-    As many children as jobs are at work at once, which is the number of the worker's threads.
+    There are as many children as jobs that run at once, which is the number of threads of the worker.
     """
 
     def __init__(self, name: str, limits: Limits) -> None:
         self.name, self.limits = name, limits
 
     def setup(self, worker: Worker) -> None:
-        """Called by Dask on the worker."""
+        """Prepare the worker; called by Dask."""
         self._ended = threading.Event()
-        self._free: queue.SimpleQueue[Child] = queue.SimpleQueue()
-        self._memory = self.limits.bytes()
+        self._idle: queue.SimpleQueue[ChildProcess] = queue.SimpleQueue()
+        self._memory = self.limits.memory_of_child()
 
     def teardown(self, worker: Worker) -> None:
-        """Called by Dask when the batch or the worker ends."""
+        """End all children; called by Dask when the batch or the worker ends."""
         self._ended.set()
-        while not self._free.empty():
-            self._free.get().kill()
+        while not self._idle.empty():
+            self._idle.get().kill()
 
-    def do(self, job: Job, seconds: float, unfinished: Path) -> Outcome:
-        """See `work.do`."""
+    def run(self, job: Job, seconds: float, unfinished: Path) -> Outcome:
+        """Run a job in an idle child or in a new one; see `run_job`."""
         try:
-            child = self._free.get_nowait()  # other threads of the worker take from it, too
+            child = self._idle.get_nowait()
         except queue.Empty:
-            child = Child(python_program(), self._memory, self._ended.is_set)
+            child = ChildProcess(python_program(), self._memory, self._ended.is_set)
         try:
-            return do(job, child, seconds, unfinished)
+            return run_job(job, child, seconds, unfinished)
         except EndedError:
             child.kill()
             raise
         finally:
             if self._ended.is_set():
                 child.kill()
-            self._free.put(child)
+            self._idle.put(child)

@@ -1,9 +1,9 @@
-"""What a user reads when a batch cannot begin or go on."""
+"""Errors that end a batch."""
 
 
 class BatchError(Exception):
-    """A batch as a whole cannot be run; the message names what is wrong and says what to do."""
+    """The batch as a whole cannot be run; the message says why, and what the user can do."""
 
 
 class EndedError(Exception):
-    """A batch was ended by the user while a job was at work."""
+    """The user ended the batch while a job was running."""

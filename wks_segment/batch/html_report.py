@@ -1,4 +1,4 @@
-"""The report of a batch: a page that a browser shows, failures first."""
+"""Report of a batch: an HTML page, failures first."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from urllib.parse import quote
 
 from .job import Outcome
 
-NAME = "report.html"
-THUMBNAIL = ".png"
-STYLE = """
+REPORT_NAME = "report.html"
+THUMBNAIL_SUFFIX = ".png"
+STYLE_SHEET = """
 :root { color-scheme: light dark; font: 15px/1.45 system-ui, sans-serif; }
 body { max-width: 80rem; margin: 2rem auto; padding: 0 1rem; }
 table { border-collapse: collapse; width: 100%; }
@@ -26,41 +26,43 @@ small { opacity: .75; }
 """
 
 
-def write_page(folder: Path, outcomes: Iterable[Outcome], planned: int, title: str = "WKS Segment: a batch") -> Path:
-    """Write the report of a batch into its folder, with links relative to it.
+def write_report(folder: Path, outcomes: Iterable[Outcome], n_files: int, title: str = "WKS Segment: a batch") -> Path:
+    """Write the report of a batch to its folder, with links relative to it; return its path.
 
     Parameters
     ----------
     folder : path
     outcomes
-    planned : int
-        Files of the batch, with those of which there is no outcome yet.
+    n_files : int
+        Number of files of the batch, including those that have no outcome yet.
+    title : str
     """
-    known = sorted(outcomes, key=lambda outcome: outcome.name.casefold())
-    failed, done = [each for each in known if not each.done], [each for each in known if each.done]
-    missing = planned - len(known)
-    summary = f"{len(done)} of {planned} files done, {len(failed)} failed" + (
-        f", {missing} to do" if missing > 0 else ""
-    )
+    outcomes = sorted(outcomes, key=lambda outcome: outcome.name.casefold())
+    failed = [outcome for outcome in outcomes if not outcome.done]
+    done = [outcome for outcome in outcomes if outcome.done]
+    n_missing = n_files - len(outcomes)
+    summary = f"{len(done)} of {n_files} files done, {len(failed)} failed"
+    if n_missing > 0:
+        summary += f", {n_missing} to do"
     text = "\n".join([
         "<!doctype html>",
         f'<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        f"<style>{STYLE}</style></head><body>",
+        f"<style>{STYLE_SHEET}</style></head><body>",
         f"<h1>{escape(title)}</h1><p>{escape(summary)}</p>",
-        *_failures(failed),
+        *_table_of_failures(failed),
         "<h2>Done</h2><main>" if done else "<main>",
         *map(_figure, done),
         "</main></body></html>",
     ])  # fmt: skip
-    path = folder / NAME
+    path = folder / REPORT_NAME
     unfinished = path.with_suffix(".part")
     unfinished.write_text(text, encoding="utf-8")
     unfinished.replace(path)
     return path
 
 
-def _failures(failed: list[Outcome]) -> Iterable[str]:
+def _table_of_failures(failed: list[Outcome]) -> Iterable[str]:
     if not failed:
         return
     yield '<h2>Failed</h2><table class="failed"><tr><th>file</th><th>why</th><th>seconds</th></tr>'
@@ -73,19 +75,20 @@ def _failures(failed: list[Outcome]) -> Iterable[str]:
 
 
 def _figure(outcome: Outcome) -> str:
+    """Thumbnail of a file with its name, links, facts and warnings."""
     files = list(outcome.outputs.values())
-    picture = next((file for file in files if file.endswith(THUMBNAIL)), None)
-    shown = "" if picture is None else f'<img loading="lazy" src="{quote(picture)}" alt="{escape(outcome.name)}">'
+    picture = next((file for file in files if file.endswith(THUMBNAIL_SUFFIX)), None)
+    image = "" if picture is None else f'<img loading="lazy" src="{quote(picture)}" alt="{escape(outcome.name)}">'
     links = [f'<a href="{quote(file)}">{escape(file)}</a>' for file in files if file != picture]
-    said = [f"{outcome.result['segments']} segments"] if "segments" in outcome.result else []
-    said += [f"{len(poses)} pose{'s' * (len(poses) != 1)}"] if (poses := outcome.result.get("poses")) else []
-    said += [f"best model: {outcome.result['best']}"] if outcome.result.get("best") else []
-    said += [str(ranking.get("says")) for ranking in outcome.result.get("rankings", ())]
-    said += [f"{outcome.seconds:.1f} seconds"]
+    facts = [f"{outcome.result['segments']} segments"] if "segments" in outcome.result else []
+    facts += [f"{len(poses)} pose{'s' * (len(poses) != 1)}"] if (poses := outcome.result.get("poses")) else []
+    facts += [f"best model: {outcome.result['best']}"] if outcome.result.get("best") else []
+    facts += [str(ranking.get("says")) for ranking in outcome.result.get("rankings", ())]
+    facts += [f"{outcome.seconds:.1f} seconds"]
     warnings = [
-        f'<br><small class="warning">{escape(str(each))}</small>' for each in outcome.result.get("warnings", ())
+        f'<br><small class="warning">{escape(str(warning))}</small>' for warning in outcome.result.get("warnings", ())
     ]
     return (
-        f'<figure>{shown}<figcaption><strong title="{escape(outcome.input)}">{escape(outcome.name)}</strong><br>'
-        f"<small>{escape(', '.join(said))}</small><br>{'<br>'.join(links)}{''.join(warnings)}</figcaption></figure>"
+        f'<figure>{image}<figcaption><strong title="{escape(outcome.input)}">{escape(outcome.name)}</strong><br>'
+        f"<small>{escape(', '.join(facts))}</small><br>{'<br>'.join(links)}{''.join(warnings)}</figcaption></figure>"
     )

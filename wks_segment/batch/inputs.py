@@ -1,4 +1,4 @@
-"""Which files a batch takes, and what their results are called."""
+"""Input files of a batch, and the names of their results."""
 
 from __future__ import annotations
 
@@ -11,54 +11,54 @@ from pathlib import Path
 from .errors import BatchError
 
 
-def inputs_of(given: Sequence[str], suffixes: Collection[str], without: Path) -> list[tuple[Path, Path]]:
-    """Files that arguments name, each once: its absolute path, and the folder that it was found from.
+def find_inputs(arguments: Sequence[str], suffixes: Collection[str], excluded: Path) -> list[tuple[Path, Path]]:
+    """Input files that the arguments name, each once: absolute path, and the folder where the search for it began.
 
     Parameters
     ----------
-    given
-        Files as they are; folders, in which all files of known formats are meant, at any depth; patterns with `*`, `?`,
-        `[…]` and `**` for any depth, of which files of known formats are meant.
+    arguments
+        Files; folders, which stand for all files of known formats in them, at any depth; patterns with `*`, `?`, `[…]`
+        and, for any depth, `**`, which stand for the matching files of known formats.
     suffixes
-        Of known formats, in lower case with their dot.
-    without
-        A folder that is left out: where results go.
+        File name suffixes of known formats, in lower case, with the dot.
+    excluded
+        A folder that is not searched: that of the results.
 
     Raises
     ------
     BatchError
         If an argument names no file.
     """
-    found: dict[Path, Path] = {}
-    for argument in given:
+    roots: dict[Path, Path] = {}
+    for argument in arguments:
         path = Path(argument)
         if path.is_dir():
             root, paths = path, sorted(path.rglob("*"))
         elif path.exists():
-            found.setdefault(_absolute(path), _absolute(path).parent)
+            roots.setdefault(_absolute(path), _absolute(path).parent)
             continue
         elif glob.has_magic(argument):
-            root, paths = _plain_part(path), sorted(map(Path, glob.glob(argument, recursive=True)))
+            root, paths = _fixed_folders(path), sorted(map(Path, glob.glob(argument, recursive=True)))
         else:
             raise BatchError(f"{argument}: there is no such file or folder")
-        known = [each for each in map(_absolute, paths) if each.suffix.lower() in suffixes and each.is_file()]
-        known = [each for each in known if _absolute(without) not in each.parents]
-        if not known:
-            raise BatchError(f"{argument}: there is no file in it that can be read; known are {', '.join(suffixes)}")
-        for each in known:
-            found.setdefault(each, _absolute(root))
-    return list(found.items())
+        files = [file for file in map(_absolute, paths) if file.suffix.lower() in suffixes and file.is_file()]
+        files = [file for file in files if _absolute(excluded) not in file.parents]
+        if not files:
+            raise BatchError(f"{argument}: no file in it can be read; known formats are {', '.join(suffixes)}")
+        for file in files:
+            roots.setdefault(file, _absolute(root))
+    return list(roots.items())
 
 
-def names_of(inputs: Sequence[tuple[Path, Path]]) -> list[str]:
-    """A name for the results of each input, with `/` between folders; no two alike, on any system.
+def result_names(inputs: Sequence[tuple[Path, Path]]) -> list[str]:
+    """A name for the results of each input, with `/` between folders, unique on all systems.
 
-    The path from the folder in which it was found, without its suffix. Where two are alike: from the folder that all
-    have in common; if that is not enough, with the suffix; and in the end with a number.
+    It is the path from the folder where the search began, without the suffix. Where two are equal, it is the path from
+    the common folder of all inputs; if that does not help, with the suffix, and finally with a number.
     """
     if not inputs:
         return []
-    common = Path(os.path.commonpath([path.parent for path, _ in inputs])) if _one_drive(inputs) else None
+    common = Path(os.path.commonpath([path.parent for path, _ in inputs])) if _on_one_drive(inputs) else None
     choices = [
         (
             path.relative_to(root).with_suffix("").as_posix(),
@@ -69,19 +69,19 @@ def names_of(inputs: Sequence[tuple[Path, Path]]) -> list[str]:
     ]
     level = [0] * len(inputs)
     while True:
-        names = [of_input[at] for of_input, at in zip(choices, level, strict=True)]
-        # Files of one name but for upper and lower case are one file on Windows and macOS.
-        count = Counter(name.casefold() for name in names)
-        alike = [i for i, name in enumerate(names) if count[name.casefold()] > 1 and level[i] < 2]
-        if not alike:
+        names = [choice[i] for choice, i in zip(choices, level, strict=True)]
+        # Names that differ only in case are one file on Windows and macOS.
+        counts = Counter(name.casefold() for name in names)
+        equal = [i for i, name in enumerate(names) if counts[name.casefold()] > 1 and level[i] < 2]
+        if not equal:
             return _numbered(names)
-        for i in alike:
+        for i in equal:
             level[i] += 1
 
 
 def _numbered(names: Sequence[str]) -> list[str]:
-    """Those that are still alike as `name`, `name 2`, …"""
-    found: list[str] = []
+    """Names in which equal ones are `name`, `name 2`, …"""
+    unique: list[str] = []
     taken: set[str] = set()
     for name in names:
         number, free = 1, name
@@ -89,17 +89,17 @@ def _numbered(names: Sequence[str]) -> list[str]:
             number += 1
             free = f"{name} {number}"
         taken.add(free.casefold())
-        found.append(free)
-    return found
+        unique.append(free)
+    return unique
 
 
 def _absolute(path: Path) -> Path:
-    """Absolute and without `..`, but with links as they are: a name is what the user gave."""
+    """Absolute path without `..`, in which links are kept, since names come from the path that the user gave."""
     return Path(os.path.abspath(path))
 
 
-def _plain_part(pattern: Path) -> Path:
-    """The folders of a pattern before the first with a wildcard."""
+def _fixed_folders(pattern: Path) -> Path:
+    """Folders of a pattern before the first one with a wildcard."""
     parts = []
     for part in pattern.parts:
         if glob.has_magic(part):
@@ -108,5 +108,5 @@ def _plain_part(pattern: Path) -> Path:
     return Path(*parts)
 
 
-def _one_drive(inputs: Sequence[tuple[Path, Path]]) -> bool:
+def _on_one_drive(inputs: Sequence[tuple[Path, Path]]) -> bool:
     return len({path.drive for path, _ in inputs}) == 1

@@ -1,4 +1,4 @@
-"""One file of a batch: what is to be done with it, and what came of it."""
+"""One job of a batch and its outcome."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from typing import Any, Literal
 
 @dataclass(frozen=True)
 class Job:
-    """One call of the command line.
+    """One call of the command line for one file.
 
     Attributes
     ----------
     input : str
-        The file, by its absolute path.
+        Absolute path of the file.
     name : str
-        Of its results, see `names_of`.
+        Name of its results; see `result_names`.
     command : str
     arguments : tuple of str
-        Behind the command and the file.
+        Arguments after the command and the file.
     outputs : dict
         Option of the command to the file that it writes, relative to the folder of the batch.
     key : str
-        Another one if the file or anything that enters its results differs; see `key_of`.
+        Hash of the file's state and of everything else that its results depend on; see `job_key`.
     """
 
     input: str
@@ -37,15 +37,15 @@ class Job:
     outputs: Mapping[str, str]
     key: str
 
-    def call(self, folder: Path) -> list[str]:
-        """The arguments of the command line that writes to a folder."""
+    def arguments_for(self, folder: Path) -> list[str]:
+        """Arguments of the command line that make it write its outputs to a folder."""
         outputs = [f"{option}={folder / path}" for option, path in self.outputs.items()]
         return [self.command, self.input, *self.arguments, *outputs]
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a job: one line of the list.
+    """Outcome of a job: one line of the log.
 
     Attributes
     ----------
@@ -53,16 +53,17 @@ class Outcome:
         As in the job.
     status : "done" or "failed"
     reason : str
-        Why it failed; empty if it did not.
+        Why the job failed; empty if it is done.
     seconds : float
+        Duration of the job.
     outputs : dict
         Option to file, relative to the folder of the batch.
     place : str
-        Folder in which the results are written first; empty if there are none.
+        Name of the folder in which the results were written first; empty if there are none.
     machine : str
-        Where it was done.
+        Host name of the machine that ran the job.
     result : dict
-        What the command printed.
+        Fields of the command's result.
     """
 
     input: str
@@ -78,16 +79,16 @@ class Outcome:
 
     @property
     def done(self) -> bool:
-        """Whether there are results."""
+        """Whether the job has results."""
         return self.status == "done"
 
-    def line(self) -> str:
-        """As JSON, in one line."""
-        return json.dumps(_plain(asdict(self)), ensure_ascii=False, allow_nan=False)
+    def to_line(self) -> str:
+        """The outcome as one line of JSON."""
+        return json.dumps(_finite(asdict(self)), ensure_ascii=False, allow_nan=False)
 
     @classmethod
-    def of_line(cls, line: str) -> Outcome | None:
-        """What `line` gave; None for what is none, as a line that was not written to its end."""
+    def from_line(cls, line: str) -> Outcome | None:
+        """Outcome from a line of the log; None if the line is none, for example incomplete."""
         try:
             values = json.loads(line)
             outcome = cls(**values)
@@ -97,26 +98,26 @@ class Outcome:
         return outcome if all(isinstance(text, str) for text in texts) else None
 
 
-def key_of(path: Path, settings: Sequence[str]) -> str:
-    """A name for what comes of a file with settings: by its path, size and time of change, and all that they say."""
+def job_key(path: Path, settings: Sequence[str]) -> str:
+    """Hash of a file's path, size and modification time, and of settings; the same key means the same results."""
     state = path.stat()
-    told = json.dumps([path.as_posix(), state.st_size, state.st_mtime_ns, *settings])
-    return hashlib.blake2b(told.encode(), digest_size=12).hexdigest()
+    text = json.dumps([path.as_posix(), state.st_size, state.st_mtime_ns, *settings])
+    return hashlib.blake2b(text.encode(), digest_size=12).hexdigest()
 
 
-def content_of(path: Path) -> str:
-    """A name for the content of a model's file, or of all models of a folder."""
+def hash_models(path: Path) -> str:
+    """Hash of the content of a model file, or of all model files in a folder."""
     digest = hashlib.blake2b(digest_size=12)
-    for each in sorted(path.glob("*.json")) if path.is_dir() else [path]:
-        if each.is_file():
-            digest.update(each.name.encode() + b"\0" + each.read_bytes())
+    for file in sorted(path.glob("*.json")) if path.is_dir() else [path]:
+        if file.is_file():
+            digest.update(file.name.encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()
 
 
-def _plain(value: Any) -> Any:
-    """Without numbers that JSON does not know."""
+def _finite(value: Any) -> Any:
+    """A value in which numbers that JSON does not have (NaN, infinity) are None."""
     if isinstance(value, Mapping):
-        return {str(name): _plain(each) for name, each in value.items()}
+        return {str(name): _finite(item) for name, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
+        return [_finite(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value

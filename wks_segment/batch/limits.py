@@ -1,62 +1,41 @@
-"""What a job may take."""
+"""Limits of a job's time and memory, and the memory that a process holds."""
 
 from __future__ import annotations
 
-import os
-import sys
 from dataclasses import dataclass
-from pathlib import Path
+
+import psutil
 
 from ..core.spectral.memory import available_memory
 
-OF_FREE = 0.9
-"""Share of the memory that is free at first which a child may take, if nothing else is said: before the system has to
-end a process, and perhaps another one, the one that takes it all is ended."""
+SHARE_OF_FREE_MEMORY = 0.9
+"""Share of the free memory that a child may hold if no limit is given: a child that fills the memory is ended before
+the system ends one process or another."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a job may take before it is ended.
+    """Limits of a job, which is ended when it exceeds one of them.
 
     Attributes
     ----------
     seconds : float
     memory : int or None
-        Bytes of a child, resident; None: 0.9 of what is free on its machine when the batch begins there.
+        Bytes of resident memory of a child. None: 0.9 of the memory that is free on its machine when the batch begins
+        there.
     """
 
     seconds: float
     memory: int | None = None
 
-    def bytes(self) -> float:
-        """Of a child on this machine."""
-        if self.memory is not None:
-            return self.memory
-        free = available_memory()
-        return float("inf") if free is None else OF_FREE * free
+    def memory_of_child(self) -> float:
+        """Bytes that a child on this machine may hold."""
+        return SHARE_OF_FREE_MEMORY * available_memory() if self.memory is None else self.memory
 
 
-def can_watch_memory() -> bool:
-    """Whether `resident` knows anything here."""
-    return resident(os.getpid()) is not None
-
-
-def resident(pid: int) -> int | None:
-    """Bytes of memory that a process holds; None if it is not there, or where that cannot be told.
-
-    From the system itself on Linux, elsewhere from psutil, if that is installed (Dask brings it).
-    """
-    if sys.platform == "linux":
-        try:
-            pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
-        except (OSError, IndexError):
-            return None
-        return pages * os.sysconf("SC_PAGE_SIZE")
-    try:
-        import psutil
-    except ImportError:
-        return None
+def resident_memory(pid: int) -> int:
+    """Bytes of resident memory of a process; 0 if it has ended."""
     try:
         return int(psutil.Process(pid).memory_info().rss)
     except psutil.Error:
-        return None
+        return 0

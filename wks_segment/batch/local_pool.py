@@ -1,4 +1,4 @@
-"""Jobs on this machine: as many children as are wanted, each looked after by a thread."""
+"""Run jobs on this machine, in several child processes, each controlled by a thread."""
 
 from __future__ import annotations
 
@@ -10,50 +10,61 @@ from pathlib import Path
 from .errors import EndedError
 from .job import Job, Outcome
 from .limits import Limits
-from .run_job import do
-from .worker_process import Child, Program
+from .run_job import run_job
+from .worker_process import ChildProcess, Program
 
 
-def outcomes(
+def run_jobs(
     jobs: Sequence[Job], program: Program, processes: int, limits: Limits, unfinished: Path
 ) -> Generator[Outcome]:
-    """What comes of each job, as soon as it is there. To close the iterator ends all children.
+    """Outcome of each job as soon as it has ended. Closing the generator ends all children.
+
+    Parameters
+    ----------
+    jobs
+    program : Program
+        Starts a child.
+    processes : int
+        Number of children that run at once.
+    limits : Limits
+    unfinished : path
+        Folder in which results are written first.
 
     Raises
     ------
     BatchError
-        If children cannot be started.
+        If no child can be started.
     """
     waiting: queue.SimpleQueue[Job] = queue.SimpleQueue()
     for job in jobs:
         waiting.put(job)
-    found: queue.SimpleQueue[Outcome | BaseException] = queue.SimpleQueue()
+    results: queue.SimpleQueue[Outcome | BaseException] = queue.SimpleQueue()
     ended = threading.Event()
-    memory = limits.bytes()
+    memory = limits.memory_of_child()
 
-    def look_after() -> None:
-        child = Child(program, memory, ended.is_set)
+    def control_child() -> None:
+        child = ChildProcess(program, memory, ended.is_set)
         try:
             while not ended.is_set():
-                found.put(do(waiting.get_nowait(), child, limits.seconds, unfinished))
+                results.put(run_job(waiting.get_nowait(), child, limits.seconds, unfinished))
         except queue.Empty:
             child.close()
         except EndedError:
             child.kill()
         except BaseException as error:
-            found.put(error)
+            results.put(error)
         finally:
             child.kill()
 
-    threads = [threading.Thread(target=look_after) for _ in range(min(processes, len(jobs)))]
+    threads = [threading.Thread(target=control_child) for _ in range(min(processes, len(jobs)))]
     try:
         for thread in threads:
             thread.start()
         for _ in jobs:
-            done = _next(found)
-            if isinstance(done, BaseException):
-                raise done
-            yield done
+            result = _next(results)
+            if isinstance(result, BaseException):
+                raise result
+            yield result
     finally:
         ended.set()
         for thread in threads:
@@ -61,10 +72,10 @@ def outcomes(
                 thread.join()
 
 
-def _next(found: queue.SimpleQueue[Outcome | BaseException]) -> Outcome | BaseException:
-    """The next in a queue. Asked again and again, since on Windows Ctrl+C does not end a wait."""
+def _next(results: queue.SimpleQueue[Outcome | BaseException]) -> Outcome | BaseException:
+    """Next item of a queue. Waits for a second at a time, since Ctrl+C on Windows does not end a longer wait."""
     while True:
         try:
-            return found.get(timeout=1)
+            return results.get(timeout=1)
         except queue.Empty:
             continue

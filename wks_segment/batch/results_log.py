@@ -1,4 +1,4 @@
-"""The list of a batch: what came of each file, in a file of JSON lines that grows as the batch goes on."""
+"""Log of a batch: the outcome of each job, a line of JSON each, in a file that grows while the batch runs."""
 
 from __future__ import annotations
 
@@ -11,34 +11,49 @@ from typing import TextIO
 from .errors import BatchError
 from .job import Outcome
 
-NAME = "batch"
-SUFFIX = ".jsonl"
+LOG_NAME = "batch"
+LOG_SUFFIX = ".jsonl"
 
 
-def record_name(part: tuple[int, int] | None) -> str:
-    """Of the list of a whole batch, or of a part of it."""
-    return NAME + ("" if part is None else f".{part[0]}-of-{part[1]}") + SUFFIX
+def log_name(part: tuple[int, int] | None) -> str:
+    """File name of the log of a whole batch, or of the i-th of n parts of one."""
+    return LOG_NAME + ("" if part is None else f".{part[0]}-of-{part[1]}") + LOG_SUFFIX
 
 
-def records_in(folder: Path) -> list[Path]:
-    """The lists in a folder: of the whole batch, of its parts."""
-    return sorted(folder.glob(f"{NAME}{SUFFIX}")) + sorted(folder.glob(f"{NAME}.*-of-*{SUFFIX}"))
+def find_logs(folder: Path) -> list[Path]:
+    """The logs in a folder: that of the whole batch, then those of its parts."""
+    return sorted(folder.glob(f"{LOG_NAME}{LOG_SUFFIX}")) + sorted(folder.glob(f"{LOG_NAME}.*-of-*{LOG_SUFFIX}"))
 
 
-def read_record(path: Path) -> dict[str, Outcome]:
-    """Input to what came of it, the last line of each; lines that were not written to their end count as none."""
+def read_log(path: Path) -> dict[str, Outcome]:
+    """Last outcome of each input in a log; incomplete lines are skipped."""
     try:
         text = path.read_text(encoding="utf-8", errors="replace")
     except FileNotFoundError:
         return {}
-    found = [Outcome.of_line(line) for line in text.splitlines()]
-    return {outcome.input: outcome for outcome in found if outcome is not None}
+    outcomes = [Outcome.from_line(line) for line in text.splitlines()]
+    return {outcome.input: outcome for outcome in outcomes if outcome is not None}
 
 
-class Record:
-    """A list that is being written: what was in it, and what is added, which is on the disk before `add` returns.
+def read_logs(paths: Iterable[Path]) -> dict[str, Outcome]:
+    """Outcome of each input in several logs; later logs prevail."""
+    outcomes: dict[str, Outcome] = {}
+    for path in paths:
+        outcomes |= read_log(path)
+    return outcomes
 
-    Only one process writes to a list.
+
+def write_log(path: Path, outcomes: Iterable[Outcome]) -> None:
+    """Write a log anew; the file appears complete."""
+    unfinished = path.with_suffix(".part")
+    unfinished.write_text("".join(f"{outcome.to_line()}\n" for outcome in outcomes), encoding="utf-8")
+    unfinished.replace(path)
+
+
+class ResultsLog:
+    """A log that is read and then appended to; a context manager that locks the file.
+
+    An added line is on the disk before `add` returns.
 
     Parameters
     ----------
@@ -47,60 +62,53 @@ class Record:
     Attributes
     ----------
     outcomes : dict
-        Input to what came of it.
+        Input to its last outcome.
 
     Raises
     ------
     BatchError
-        If another process does so.
+        When it is entered while another process writes to the log.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.outcomes: dict[str, Outcome] = {}
         self._file: TextIO | None = None
-        self._lines = 0
+        self._n_lines = 0
 
-    def __enter__(self) -> Record:
-        self._file = open(self.path, "a+", encoding="utf-8", errors="replace")  # closed at exit
-        if not _locked(self._file):
+    def __enter__(self) -> ResultsLog:
+        self._file = open(self.path, "a+", encoding="utf-8", errors="replace")  # closed by __exit__
+        if not _lock(self._file):
             self._file.close()
-            raise BatchError(f"{self.path}: another batch is at work on it: wait for its end, or take another --output")
-        self.outcomes = read_record(self.path)
+            raise BatchError(f"{self.path}: another batch writes to it: wait for its end, or take another --output")
+        self.outcomes = read_log(self.path)
         self._file.seek(0)
         text = self._file.read()
-        self._lines = len(text.splitlines())
+        self._n_lines = len(text.splitlines())
         if text and not text.endswith("\n"):
-            self._file.write("\n")  # a line that was not written to its end stays one that counts as none
+            self._file.write("\n")  # an incomplete line must not become the beginning of the next one
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         assert self._file is not None
-        if self._lines > len(self.outcomes):
-            write_record(self.path, self.outcomes.values())  # one line a file, for who reads it
+        if self._n_lines > len(self.outcomes):
+            write_log(self.path, self.outcomes.values())  # one line for each file, which is easier to read
         self._file.close()
 
     def add(self, outcome: Outcome) -> None:
-        """Write a line; the last of a file is the one that counts."""
+        """Append the outcome of a job; it replaces earlier ones of the same input."""
         assert self._file is not None
-        self._file.write(f"{outcome.line()}\n")
+        self._file.write(f"{outcome.to_line()}\n")
         self._file.flush()
         os.fsync(self._file.fileno())
-        self._lines += 1
+        self._n_lines += 1
         self.outcomes[outcome.input] = outcome
 
 
-def write_record(path: Path, outcomes: Iterable[Outcome]) -> None:
-    """Write a list anew; it appears whole."""
-    unfinished = path.with_suffix(".part")
-    unfinished.write_text("".join(f"{outcome.line()}\n" for outcome in outcomes), encoding="utf-8")
-    unfinished.replace(path)
-
-
-def _locked(file: TextIO) -> bool:
-    """Lock a file until it is closed; False if another process has done so. Not on Windows, which has no such lock."""
+def _lock(file: TextIO) -> bool:
+    """Lock a file until it is closed; False if another process holds the lock. Windows has no such lock."""
     try:
         import fcntl
     except ImportError:

@@ -1,4 +1,4 @@
-"""One job, done by a child: the same on this machine and on any other."""
+"""Run one job in a child process, on this machine or on that of a Dask worker."""
 
 from __future__ import annotations
 
@@ -9,44 +9,39 @@ import time
 from pathlib import Path
 
 from .job import Job, Outcome
-from .worker_process import Child, ChildError
+from .worker_main import Answer
+from .worker_process import ChildError, ChildProcess
 
-KEPT = ("segments", "parts", "poses", "certainty", "rankings", "best", "verdict", "warnings", "notes")
-"""Of what a command prints, what the list keeps."""
+LOGGED_FIELDS = ("segments", "parts", "poses", "certainty", "rankings", "best", "verdict", "warnings", "notes")
+"""Fields of a command's result that are logged."""
 
 
-def do(job: Job, child: Child, seconds: float, unfinished: Path) -> Outcome:
-    """Have a child do a job; what came of it.
+def run_job(job: Job, child: ChildProcess, seconds: float, unfinished: Path) -> Outcome:
+    """Run a job in a child process.
 
     Parameters
     ----------
     job : Job
-    child : Child
+    child : ChildProcess
     seconds : float
-        Limit of its time.
+        Time limit.
     unfinished : path
-        A folder in which its results are written first, in one of their own.
+        Folder in which a new folder is made for the results.
 
     Raises
     ------
     EndedError, BatchError
-        As `Child.call`.
+        As `ChildProcess.call` does.
     """
     begun = time.monotonic()
-    # Another one each time: a machine that was taken for lost may still write.
+    # A new folder for each run: a machine that is believed dead may still write to its own.
     folder = Path(tempfile.mkdtemp(dir=unfinished, prefix=f"{job.key}-"))
     folder.chmod(0o755)
     result, reason = None, ""
     try:
         for path in job.outputs.values():
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        try:
-            answer = child.call(job.call(folder), seconds)
-        except ChildError as error:
-            if not error.innocent:
-                raise
-            answer = child.call(job.call(folder), seconds)  # by a fresh process
-        result, reason = answer.result, answer.error
+        result, reason = _call(job, child, seconds, folder)
         missing = [path for path in job.outputs.values() if not (folder / path).is_file()]
         if result is not None and missing:
             result, reason = None, f"it was not written: {', '.join(missing)}"
@@ -55,21 +50,30 @@ def do(job: Job, child: Child, seconds: float, unfinished: Path) -> Outcome:
     finally:
         if result is None:
             shutil.rmtree(folder, ignore_errors=True)
-    # Names in messages are those of the batch, not of where results are written first.
-    reason = reason.replace(f"{folder}/", "")
     return Outcome(
         job.input, job.name, job.key,
         status="failed" if result is None else "done",
-        reason=reason,
+        reason=reason.replace(f"{folder}/", ""),  # paths relative to the folder of the batch
         seconds=round(time.monotonic() - begun, 3),
-        outputs={} if result is None else {**job.outputs, **_beside(folder, job)},
+        outputs={} if result is None else {**job.outputs, **_other_outputs(folder, job)},
         place="" if result is None else folder.name,
         machine=platform.node(),
-        result={name: result[name] for name in KEPT if name in result} if result else {},
+        result={name: result[name] for name in LOGGED_FIELDS if name in result} if result else {},
     )  # fmt: skip
 
 
-def _beside(folder: Path, job: Job) -> dict[str, str]:
-    """What a command wrote beside its outputs, as the materials of an .obj file, by its own name."""
+def _call(job: Job, child: ChildProcess, seconds: float, folder: Path) -> Answer:
+    """Answer of a child to a job; asked again if the first process ended after it had run other jobs."""
+    arguments = job.arguments_for(folder)
+    try:
+        return child.call(arguments, seconds)
+    except ChildError as error:
+        if not error.may_retry:
+            raise
+    return child.call(arguments, seconds)
+
+
+def _other_outputs(folder: Path, job: Job) -> dict[str, str]:
+    """Files that a command wrote beside its outputs, such as the .mtl of an .obj file, under their own names."""
     paths = (path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*")) if path.is_file())
     return {path: path for path in paths if path not in job.outputs.values()}

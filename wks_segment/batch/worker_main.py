@@ -1,7 +1,7 @@
-"""A child process at work: takes calls of the command line, one after the other, until its parent is gone.
+"""Main loop of a child process: runs calls of the command line, one after the other, until its parent is gone.
 
-Calls come by standard input, a line of JSON each. Answers are files that appear whole, since Blender itself, importers
-and add-ons print on standard output whenever they like.
+Calls arrive on standard input, a line of JSON each. Answers are files that appear complete. They are not sent on
+standard output, since Blender, importers and add-ons print there at any time.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-READY = "ready"
-"""Name of the file that says that a child waits for calls."""
-LATER = 1.5
-"""Times of its limit after which a job is ended by its own process, should the parent not have done so."""
+READY_FILE = "ready"
+"""Name of the file by which a child says that it is ready for calls."""
+SELF_END_FACTOR = 1.5
+"""A child whose parent failed to end it in time ends itself after this multiple of the time limit, plus 10 seconds."""
 
 
 class Answer(NamedTuple):
-    """What came of a call: its result, or why there is none."""
+    """Result of a call, or the reason why there is none."""
 
     result: dict[str, Any] | None
     error: str = ""
@@ -37,17 +37,22 @@ def serve(folder: Path, run: Callable[[list[str]], Answer]) -> int:
     Parameters
     ----------
     folder : path
-        Where answers are written, each under the number of its call.
+        Folder for the answers; the name of each is the number of its call.
     run : callable
-        Runs one call of the command line. Whatever it raises is an answer as well.
+        Runs one call of the command line. An error that it raises is sent as an answer.
+
+    Returns
+    -------
+    int
+        Exit code of the process.
     """
     calls: queue.SimpleQueue[str] = queue.SimpleQueue()
-    threading.Thread(target=_listen, args=(calls, folder), daemon=True).start()
-    _write(folder / READY, {})
+    threading.Thread(target=_read_calls, args=(calls, folder), daemon=True).start()
+    _write(folder / READY_FILE, {})
     while line := calls.get():
         call = json.loads(line)
-        # In C, so that it also works while a library does not let go of Python's lock.
-        faulthandler.dump_traceback_later(LATER * call["seconds"] + 10, exit=True)
+        # faulthandler works in C, so it can end the process even while a library holds the interpreter lock.
+        faulthandler.dump_traceback_later(SELF_END_FACTOR * call["seconds"] + 10, exit=True)
         try:
             answer = run(call["arguments"])
         except BaseException as error:
@@ -60,8 +65,8 @@ def serve(folder: Path, run: Callable[[list[str]], Answer]) -> int:
     return 0
 
 
-def _listen(calls: queue.SimpleQueue[str], folder: Path) -> None:
-    """Hand on calls; end the process with its parent, whatever it is doing, and leave nothing behind."""
+def _read_calls(calls: queue.SimpleQueue[str], folder: Path) -> None:
+    """Pass calls on; when standard input ends with the parent, remove the folder and end the process at once."""
     with open(0, encoding="utf-8", closefd=False) as lines:
         for line in lines:
             calls.put(line)
@@ -70,7 +75,7 @@ def _listen(calls: queue.SimpleQueue[str], folder: Path) -> None:
 
 
 def _write(path: Path, values: dict[str, Any]) -> None:
-    """Write a file that appears whole."""
+    """Write a file of JSON that appears complete."""
     unfinished = path.with_suffix(".part")
     unfinished.write_text(json.dumps(values), encoding="utf-8")
     unfinished.replace(path)

@@ -1,4 +1,10 @@
-"""A child process as its parent sees it: started, watched, ended, replaced."""
+"""A child process as its parent sees it: it is started, given calls, watched, ended and replaced.
+
+The processes are our own and not those of `concurrent.futures`, since a job may crash Blender, hang in an importer or
+fill the memory, and must cost only its own file. A crash in a `ProcessPoolExecutor` breaks the whole pool, a job that
+runs cannot be ended there, and its processes are copies of Python, not Blender programs. With 200 files, one of them
+broken and one that hangs, 198 are done, with two processes 1.98 times as fast as with one (docs/batches.md).
+"""
 
 from __future__ import annotations
 
@@ -16,42 +22,42 @@ from pathlib import Path
 from typing import Any
 
 from .errors import BatchError, EndedError
-from .limits import resident
-from .worker_main import READY, Answer
+from .limits import resident_memory
+from .worker_main import READY_FILE, Answer
 
-COMMAND = "batch-child"
-"""Of the command line: hands over to `child.serve`."""
-LOOK = 0.05
-"""Seconds between two looks at a child."""
+CHILD_COMMAND = "batch-child"
+"""Command of the command line that runs `worker_main.serve`."""
+POLL_SECONDS = 0.05
+"""Time between two checks of a child."""
 START_SECONDS = 180.0
-"""Within which a child must be ready: Blender on a slow network drive takes its time."""
-PATIENCE = 5.0
-"""Seconds that a child has to end by itself when there are no more calls."""
-LIFE = 100
-"""Calls after which a child is replaced: what libraries do not give back is given back then."""
+"""Time limit for the start of a child; Blender on a slow network drive takes long."""
+EXIT_SECONDS = 5.0
+"""Time that an idle child has to end by itself before it is killed."""
+MAX_CALLS = 100
+"""Number of calls after which a child is replaced, which frees memory that libraries never give back."""
 LAST_LINES = 3
-"""Of what a child printed, for the reason of a crash."""
+"""Number of the last printed lines of a child that are quoted in the reason of a crash."""
 ONE_THREAD = {
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
     "BLIS_NUM_THREADS": "1",
     "VECLIB_MAXIMUM_THREADS": "1",
-    "LP_NUM_THREADS": "1",  # Mesa's, where pictures are drawn without a graphics card
+    "LP_NUM_THREADS": "1",  # Mesa, which renders pictures without a graphics card
 }
-"""Environment of children: there is one for each core, and libraries read these when they are loaded."""
+"""Environment of children: each core has a child of its own, and libraries read these variables when they load."""
 
 
 @dataclass(frozen=True)
 class Program:
-    """How a child is started.
+    """How a child process is started.
 
     Attributes
     ----------
     command : tuple of str
-        The program and its arguments, behind which comes the folder for answers.
+        The program and its arguments; the folder for answers is appended.
     environment : tuple of pairs of str
-        What is added to the environment.
+        Variables that are added to the environment.
     """
 
     command: tuple[str, ...]
@@ -59,72 +65,78 @@ class Program:
 
 
 def python_program() -> Program:
-    """A child by the Python that runs, with this very package."""
-    # Not all of sys.path: Blender's own folders there would hide bpy from who imports it anew.
+    """A child in the running Python, with this package."""
+    # Not all of sys.path: Blender's own folders in it would hide bpy from a new import.
     paths = [str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])]
-    return Program((sys.executable, "-m", "wks_segment", COMMAND), (("PYTHONPATH", os.pathsep.join(paths)),))
+    return Program((sys.executable, "-m", "wks_segment", CHILD_COMMAND), (("PYTHONPATH", os.pathsep.join(paths)),))
 
 
 class ChildError(Exception):
-    """A child is gone; the message says why. `innocent`: a fresh one might do it."""
+    """A child has ended without an answer; the message says why.
 
-    def __init__(self, reason: str, innocent: bool = False) -> None:
+    Attributes
+    ----------
+    may_retry : bool
+        Whether a new process might succeed, since this one had run other jobs before.
+    """
+
+    def __init__(self, reason: str, may_retry: bool = False) -> None:
         super().__init__(reason)
-        self.innocent = innocent
+        self.may_retry = may_retry
 
 
-class Child:
-    """One child process, started when it is first needed, and again after it was ended. For one thread at a time.
+class ChildProcess:
+    """One child process, started by the first call, and again by the next one after it has ended. Not thread-safe.
 
     Parameters
     ----------
     program : Program
     memory : float
-        Bytes that it may hold.
-    ended : callable
-        Asked while waiting: whether the batch was ended.
+        Limit of its resident memory in bytes.
+    is_ended : callable
+        Tells whether the batch was ended; called while waiting for an answer.
     """
 
-    def __init__(self, program: Program, memory: float, ended: Callable[[], bool]) -> None:
-        self.program, self.memory, self.ended = program, memory, ended
+    def __init__(self, program: Program, memory: float, is_ended: Callable[[], bool]) -> None:
+        self.program, self.memory, self.is_ended = program, memory, is_ended
         self._process: subprocess.Popen[bytes] | None = None
         self._folder = Path()
-        self._calls = 0
+        self._n_calls = 0
 
     def call(self, arguments: Sequence[str], seconds: float) -> Answer:
-        """Have a call answered.
+        """Have the child run a call of the command line.
 
         Raises
         ------
         ChildError
-            If the child ended, by itself or because it took too long or too much memory.
+            If the child ended, by itself or because it exceeded a limit.
         EndedError
             If the batch was ended meanwhile.
         BatchError
             If no child can be started at all.
         """
-        if self._calls >= LIFE:
+        if self._n_calls >= MAX_CALLS:
             self.close()
         process = self._process or self._start()
-        self._calls += 1
-        told = {"number": self._calls, "arguments": list(arguments), "seconds": seconds}
+        self._n_calls += 1
+        call = {"number": self._n_calls, "arguments": list(arguments), "seconds": seconds}
         try:
             assert process.stdin is not None
-            process.stdin.write(json.dumps(told).encode() + b"\n")
+            process.stdin.write(json.dumps(call).encode() + b"\n")
             process.stdin.flush()
         except OSError:
-            process.wait()  # it crashed while nothing was to do: the look below says how
-        answer = self._await(process, self._folder / str(self._calls), seconds)
+            process.wait()  # it crashed while it was idle: `_wait_for` reports that
+        answer = self._wait_for(self._folder / str(self._n_calls), process, seconds)
         return Answer(answer["result"], answer["error"])
 
     def close(self) -> None:
-        """End the process: it has a moment to do so by itself, if it has nothing to do."""
+        """Let an idle process end by itself; kill it if it does not."""
         if self._process is None:
             return
         assert self._process.stdin is not None
         try:
             self._process.stdin.close()
-            self._process.wait(PATIENCE)
+            self._process.wait(EXIT_SECONDS)
         except (OSError, subprocess.TimeoutExpired):
             self._process.kill()
         self._forget()
@@ -143,7 +155,7 @@ class Child:
                 process = subprocess.Popen(
                     command, stdin=subprocess.PIPE, stdout=printed, stderr=printed,
                     env={**os.environ, **ONE_THREAD, **dict(self.program.environment)},
-                    # Ctrl+C is for the parent, which ends its children.
+                    # Ctrl+C reaches only the parent, which ends its children.
                     start_new_session=True, creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
                 )  # fmt: skip
         except OSError as error:
@@ -151,42 +163,42 @@ class Child:
             raise BatchError(f"{command[0]}: it could not be started: {error.strerror or error}") from error
         self._process = process
         try:
-            self._await(process, self._folder / READY, START_SECONDS)
+            self._wait_for(self._folder / READY_FILE, process, START_SECONDS)
         except ChildError as error:
             raise BatchError(f"no child process could be started by {' '.join(command[:-1])}: {error}") from error
         return process
 
-    def _await(self, process: subprocess.Popen[bytes], answer: Path, seconds: float) -> dict[str, Any]:
-        """The content of a file that a child writes."""
-        until = time.monotonic() + seconds
-        fresh = self._calls <= 1
+    def _wait_for(self, answer: Path, process: subprocess.Popen[bytes], seconds: float) -> dict[str, Any]:
+        """Content of a file that the child writes; ChildError or EndedError if it is not written."""
+        deadline = time.monotonic() + seconds
+        used_before = self._n_calls > 1
         while True:
-            over = process.poll() is not None
+            has_ended = process.poll() is not None  # before the look for the answer, which it may have written last
             if answer.exists():
                 content: dict[str, Any] = json.loads(answer.read_text(encoding="utf-8"))
                 answer.unlink()
                 return content
-            if over:
-                reason = f"its process {_how(process.returncode)}{self._said()}"
+            if has_ended:
+                reason = f"its process {_describe_exit(process.returncode)}{self._printed()}"
                 self._forget()
-                raise ChildError(reason, innocent=not fresh)
-            if self.ended():
+                raise ChildError(reason, may_retry=used_before)
+            if self.is_ended():
                 self.kill()
                 raise EndedError
-            if time.monotonic() > until:
+            if time.monotonic() > deadline:
                 self.kill()
-                raise ChildError(f"it took more than {seconds:g} seconds: it was ended; see --time-limit")
-            if (resident(process.pid) or 0) > self.memory:
+                raise ChildError(f"it took more than {seconds:g} seconds and was ended; see --time-limit")
+            if resident_memory(process.pid) > self.memory:
                 self.kill()
-                reason = f"it took more than {self.memory / 1e9:.1f} GB of memory: it was ended; see --memory-limit"
-                raise ChildError(reason, innocent=not fresh)
+                reason = f"it took more than {self.memory / 1e9:.1f} GB of memory and was ended; see --memory-limit"
+                raise ChildError(reason, may_retry=used_before)
             try:
-                process.wait(LOOK)
+                process.wait(POLL_SECONDS)
             except subprocess.TimeoutExpired:
                 continue
 
-    def _said(self) -> str:
-        """The last that it printed."""
+    def _printed(self) -> str:
+        """The last lines that the child printed, as the end of a sentence."""
         text = (self._folder / "printed").read_text(encoding="utf-8", errors="replace")
         lines = [line.strip() for line in text.splitlines() if line.strip()]
         return f"; it printed: {' | '.join(lines[-LAST_LINES:])}" if lines else ""
@@ -195,17 +207,16 @@ class Child:
         if self._process is not None:
             self._process.wait()
             assert self._process.stdin is not None
-            # What was not read any more would be written now.
             try:
-                self._process.stdin.close()
+                self._process.stdin.close()  # flushes what the process did not read, which fails
             except OSError:
                 self._process.stdin = None
-        self._process, self._calls = None, 0
+        self._process, self._n_calls = None, 0
         shutil.rmtree(self._folder, ignore_errors=True)
 
 
-def _how(code: int) -> str:
-    """In words, how a process ended."""
+def _describe_exit(code: int) -> str:
+    """How a process ended, as the predicate of a sentence."""
     if code >= 0:
         return f"ended with exit code {code}"
     try:

@@ -98,7 +98,7 @@ class Wanted:
 def check_limits(model: PoseSegmentation, poses: Sequence[Pose], settings: WKSSegmentSettings) -> None:
     """Raise TooLargeError, with the estimate, if the signatures of poses need more time or memory than is allowed."""
     seconds, needed = model.estimate([pose.mesh for pose in poses])
-    allowed = 1e9 * settings.limit_memory or available_memory() or np.inf
+    allowed = 1e9 * settings.limit_memory or available_memory()
     if seconds <= 60 * settings.limit_minutes and needed <= allowed:
         return
     most = max(pose.mesh.n_vertices for pose in poses)

@@ -199,6 +199,4 @@ class PoseDescriber:
         """Poses for which there are cores and memory at once."""
         largest = max((self._refined(mesh) for mesh in meshes), default=1)
         needed = memory_needed(largest, self.n_eigenpairs, self.accuracy)
-        free = available_memory()
-        by_memory = MAX_WORKERS if free is None else free // needed
-        return max(1, min(MAX_WORKERS, len(meshes), os.cpu_count() or 1, by_memory))
+        return max(1, min(MAX_WORKERS, len(meshes), os.cpu_count() or 1, available_memory() // needed))

@@ -128,7 +128,7 @@ def eigenpair_panels(
 def _check_memory(n_vertices: int, n_pairs: int, accuracy: Accuracy) -> None:
     """Raise MemoryError, with both figures, if less is free than a solve needs."""
     needed, free = memory_needed(n_vertices, n_pairs, accuracy), available_memory()
-    if free is not None and needed > free:
+    if needed > free:
         raise MemoryError(
             f"{n_pairs} eigenpairs of {n_vertices:,} vertices ({accuracy}) need about {needed / 1e6:,.0f} MB of "
             f"memory, and {free / 1e6:,.0f} MB are free: close other programs, or take fewer pairs or a coarser mesh"

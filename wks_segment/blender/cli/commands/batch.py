@@ -13,22 +13,22 @@ import bpy
 
 from .... import __version__
 from ....batch import (
-    COMMAND,
+    CHILD_COMMAND,
     Answer,
     Batch,
     BatchError,
     Job,
     Limits,
     Program,
-    content_of,
-    inputs_of,
-    key_of,
-    merged,
-    names_of,
+    find_inputs,
+    hash_models,
+    job_key,
+    merge_logs,
     python_program,
+    result_names,
     serve,
 )
-from ....core.poses.describe import Progress
+from ....core.progress import Progress
 from ...errors import UserError
 from ...scene import file_formats
 from .options import (
@@ -83,7 +83,7 @@ def add(commands: Any) -> None:
 
 def add_child(commands: Any, answer: Callable[[list[str]], Answer]) -> None:
     """Add the command that a batch starts its children by; it is in no help."""
-    child = commands.add_parser(COMMAND)
+    child = commands.add_parser(CHILD_COMMAND)
     child.add_argument("folder", type=Path)
 
     def run(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
@@ -101,7 +101,7 @@ def program() -> Program:
         return python_program()
     start = ["--factory-startup"] if "--factory-startup" in sys.argv else []
     enabled = ["--threads", "1", "--addons", addon]
-    return Program((bpy.app.binary_path, "--background", *start, *enabled, "--command", "wks_segment", COMMAND))
+    return Program((bpy.app.binary_path, "--background", *start, *enabled, "--command", "wks_segment", CHILD_COMMAND))
 
 
 def _add_batch(parser: argparse.ArgumentParser) -> None:
@@ -152,30 +152,30 @@ def _run(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
             options.output, jobs, program(), options.processes, Limits(options.time_limit, memory), options.scheduler,
             options.part, options.resume, options.retry,
         )  # fmt: skip
-        return batch.run(progress)
+        return batch.run(Progress.of(progress))
     except BatchError as error:
         raise UserError(str(error)) from error
 
 
 def _report(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     try:
-        return merged(options.output)
+        return merge_logs(options.output)
     except BatchError as error:
         raise UserError(str(error)) from error
 
 
 def _jobs(options: argparse.Namespace) -> list[Job]:
     """One for each file."""
-    found = inputs_of(options.inputs, file_formats.IMPORTERS, options.output)
+    found = find_inputs(options.inputs, file_formats.IMPORTERS, options.output)
     command, arguments, outputs, contents = options.jobs_of(options)
     # A thread in each process, or these would fight for the cores.
     means = ["--threads=1"]
     if options.cache:
         means += [f"--cache={options.cache.resolve()}", f"--cache-limit={options.cache_limit}"]
     jobs = []
-    for (path, _), name in zip(found, names_of(found), strict=True):
+    for (path, _), name in zip(found, result_names(found), strict=True):
         named = {option: pattern.format(name) for option, pattern in outputs.items()}
-        key = key_of(path, [__version__, command, *arguments, *contents, *outputs.values()])
+        key = job_key(path, [__version__, command, *arguments, *contents, *outputs.values()])
         jobs.append(Job(str(path), name, command, (*arguments, *means), named, key))
     return jobs
 
@@ -202,11 +202,11 @@ def _known_models(model: Path | None, folder: Path | None) -> tuple[list[str], l
     if model is not None:
         if not model.is_file():
             raise BatchError(f"{model}: there is no such file")
-        return [f"--model={model.resolve()}"], [content_of(model)]
+        return [f"--model={model.resolve()}"], [hash_models(model)]
     assert folder is not None
     if not folder.is_dir():
         raise BatchError(f"{folder}: there is no such folder")
-    return [f"--models={folder.resolve()}"], [content_of(folder)]
+    return [f"--models={folder.resolve()}"], [hash_models(folder)]
 
 
 def _thumbnail(options: argparse.Namespace) -> dict[str, str]:
