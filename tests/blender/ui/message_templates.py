@@ -111,7 +111,8 @@ def shared_names():
     found = defaultdict(list)
     for source in SOURCES:
         for target, value in assignments(ast.walk(source.tree)):
-            if isinstance(target, ast.Attribute) or name_of(target).isupper():
+            is_attribute = isinstance(target, ast.Attribute) and target.attr != "name"  # data has names of its own
+            if is_attribute or name_of(target).isupper():
                 found[name_of(target)].append(value)
         for node in ast.walk(source.tree):
             if isinstance(node, ast.ClassDef):
