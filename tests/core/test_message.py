@@ -25,6 +25,7 @@ def test_is_its_english_text():
     message = Message("{path}: there is no such file", path="a.json")
     assert message == "a.json: there is no such file"
     assert Message("no {field} here") == "no {field} here", "there are no values"
+    assert Message(message) is message
 
 
 @pytest.mark.parametrize(

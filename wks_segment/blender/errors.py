@@ -15,7 +15,7 @@ class UserError(Exception):
     """
 
     def __init__(self, template: str, **values: object) -> None:
-        super().__init__(Message(template, **values) if values or not isinstance(template, Message) else template)
+        super().__init__(Message(template, **values))
 
 
 class TooLargeError(UserError):

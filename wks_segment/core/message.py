@@ -26,7 +26,9 @@ class Message(str):
     values: dict[str, object]
 
     def __new__(cls, template: str, **values: object) -> Message:
-        """Fill in the template."""
+        """Fill in the template; a `Message` alone is returned as it is."""
+        if isinstance(template, Message) and not values:
+            return template
         text = super().__new__(cls, template.format(**values) if values else template)
         text.template, text.values = template, values
         return text

@@ -17,8 +17,8 @@ TERMINAL = {"cli", "render"}
 INTERNAL = {"NotConvergedError", "TypeError", "KeyError", "AssertionError", "NotImplementedError"}
 """Errors that the code catches itself, or that only a programmer can cause."""
 POSITIONS = {
-    **dict.fromkeys(["Message", "in_panel", "in_tooltip", "in_report", "warn"], 0),
-    **dict.fromkeys(["explain", "step", "each"], 1),
+    **dict.fromkeys(["Message", "in_panel", "in_tooltip", "in_report", "wrapped", "warn", "titled"], 0),
+    **dict.fromkeys(["explain", "step", "each", "progress"], 1),
     **dict.fromkeys(["tell", "part"], 2),
 }
 """Where a call has its text, by the name of what is called; errors have it first."""
