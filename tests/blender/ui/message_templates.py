@@ -1,7 +1,8 @@
 """Finds the texts in the code that a person can see in the window: the keys of the table of translations.
 
 A text counts if it is handed to what shows it (`tell`, `explain`, `in_panel` …), to an error, to a warning, to a step
-of `Progress`, or to `Message`. Everything that is handed over so must be a constant: a template with named fields.
+of `Progress`, or to `Message`, or if it is a sentence that a function returns. It must be a constant: a template with named
+fields.
 `cli` and `render` are left out, for they speak on the terminal only, and so are the errors of `INTERNAL`.
 """
 
@@ -162,7 +163,18 @@ def templates():
     for call in all_calls():
         for text in constants(call.text, call.scope):
             found[text].add(call.place)
+    for source in SOURCES:
+        for node in ast.walk(source.tree):
+            if isinstance(node, ast.Return) and node.value is not None:
+                for text in filter(is_sentence, constants(node.value, node)):
+                    found[text].add(f"{source.path.relative_to(PACKAGE)}:{node.lineno}")
     return found
+
+
+def is_sentence(text):
+    """Whether a text that is returned is for a person: several words, and no name, in which all are capitalized."""
+    words = text.split()
+    return len(words) > 1 and any(word.isalpha() and word.islower() for word in words)
 
 
 def fields(template):
