@@ -1,1 +1,1 @@
-"""Shape of a surface beyond its spectrum: heat flow, creases and thickness, and cuts along them."""
+"""Shape of a surface in space: heat flow, creases and thickness, and cuts along them."""

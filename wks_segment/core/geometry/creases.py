@@ -1,54 +1,53 @@
-"""What a surface looks like from outside: which way it faces, where it is concave, how thick the body under it is.
+"""Outward normals, concave creases and thickness of a surface.
 
-Not invariant to bending as the signature is, but what people go by when they cut a shape into parts: they cut along
-concave creases (the minima rule, Hoffman and Richards 1984) and where the thickness changes (Shapira, Shamir and
+Unlike the signature these change when a surface bends, but people go by them when they cut a shape into parts: they cut
+along concave creases (the minima rule, Hoffman and Richards 1984) and where the thickness changes (Shapira, Shamir and
 Cohen-Or 2008).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..mesh.adjacency import FaceAdjacency
 from ..mesh.surface import Surface, indicator
-from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray, unique_edges
+from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray, components_of_pairs, unique_edges
+from ..progress import Progress
 from .heat_flow import Flows, HeatFlow
 
 FINE, COARSE = 0.012, 0.02
-"""Widths over which normals are averaged, in units of the square root of the area: what is smaller is no crease."""
+"""Lengths over which normals are averaged, in units of the square root of the area: smaller details are no creases."""
 THICKNESS_LENGTH = 0.01
-"""Width over which thickness is averaged, in the same unit."""
-WIDEST = 0.6
-"""Radius from which balls shrink, in the same unit; a sphere's is 0.28."""
-ROUNDS = 30
-"""Rounds of shrinking at most. Five are usual."""
-NOISE = 0.5
-"""Cosine of the angle between the two places where a ball touches, from which on it is the surface's own roughness."""
-SLACK = 0.01
-"""How much further than the nearest place the one may be that is found, as a fraction."""
+"""Length over which thickness is averaged, in the same unit."""
+LARGEST_RADIUS = 0.6
+"""Radius from which balls shrink, in the same unit; a sphere has the radius 0.28."""
+MAX_SHRINKS = 30
+"""Most rounds of shrinking. Five are usual."""
+ROUGHNESS_COSINE = 0.5
+"""Cosine of the angle between the two points where a ball touches; above it, the second point is roughness of the
+surface beside the first one and not its other side."""
+SEARCH_SLACK = 0.01
+"""Relative error that the search for the nearest point may make."""
 MOST_BALLS = 20_000
-"""Vertices at which thickness is measured; others take it from the nearest of these."""
-AT_ONCE = 2_000
+"""Most vertices at which thickness is measured; others take it from the nearest of these."""
+BALLS_AT_ONCE = 2_000
 """Balls between two reports of progress."""
-CREASE, MOST_CONCAVE, MOST_CONVEX = 0.4, 15.0, 2.0
-"""Weight of a border by e to this times its curvature, which is taken between these bounds."""
-STEP, MOST_STEP = 0.1, 40.0
-"""Weight of a border by e to minus this times the change of log thickness over the unit of length, bounded."""
-SHORTEST = 3e-3
-"""Distance between faces from which on changes count as changes over that distance."""
-FLAT = 0.003
-"""Added to thickness before its logarithm, in units of the square root of the area: a sheet has none."""
+BORDER_CREASE, MOST_CONCAVE, MOST_CONVEX = 0.4, 15.0, 2.0
+"""A border is weighted by `exp(BORDER_CREASE * clip(curvature, -MOST_CONCAVE, MOST_CONVEX))`: less in creases …"""
+BORDER_STEP, MOST_STEP = 0.1, 40.0
+"""… and by `exp(-BORDER_STEP * min(step, MOST_STEP))`, where `step` is the change of log thickness per unit of length."""
+LEAST_DISTANCE = 3e-3
+"""Least distance between faces for that change: on tiny faces it would be noise."""
+LEAST_THICKNESS = 0.003
+"""Added to thickness before its logarithm, in units of the square root of the area, because a sheet has none; also the
+least distance between faces for curvature."""
 
 
 def outward(faces: IntArray, corners: FloatArray) -> FloatArray:
-    """(m,) +1 for each face whose (3, 3) corners turn counter-clockwise seen from outside, −1 for others.
+    """(m,) +1 for each face whose (3, 3) corners turn counter-clockwise seen from outside, −1 for the others.
 
-    Neighbors are made to agree, then the larger side of each loose part is taken for the inside.
+    Neighbors are made consistent; then each island is turned so that its volume is positive.
     """
     m = len(faces)
     rising = (faces < np.roll(faces, -1, axis=1)).ravel()
@@ -58,119 +57,121 @@ def outward(faces: IntArray, corners: FloatArray) -> FloatArray:
     first, second = order[same], order[same + 1]
     a, b = first // 3, second // 3
     turned = rising[first] == rising[second]
-    # Each face has two sides; sides of neighbors that look the same way hang together.
-    rows, columns = np.concatenate([a, a + m]), np.concatenate([np.where(turned, b + m, b), np.where(turned, b, b + m)])
-    graph = coo_matrix((np.ones(2 * len(a), dtype=np.int8), (rows, columns)), shape=(2 * m,) * 2)
-    side = connected_components(graph, directed=False)[1]
-    sign = np.where(side[:m] <= side[m:], 1.0, -1.0)
-    part = np.minimum(side[:m], side[m:])
+    # Each face has a front (its own number) and a back (plus m); those of neighbors on one side of the surface connect.
+    near, far = np.concatenate([a, a + m]), np.concatenate([np.where(turned, b + m, b), np.where(turned, b, b + m)])
+    layer = components_of_pairs(np.stack([near, far], axis=1), 2 * m)
+    sign = np.where(layer[:m] <= layer[m:], 1.0, -1.0)
+    island = np.minimum(layer[:m], layer[m:])
     middle = corners.reshape(-1, 3).mean(axis=0)
     x, y, z = (corners[:, i] - middle for i in range(3))
-    volume = np.bincount(part, weights=sign * np.einsum("ij,ij->i", x, np.cross(y, z)), minlength=2 * m)
-    return np.asarray(np.where(volume[part] < 0, -sign, sign))
+    volume = np.bincount(island, weights=sign * np.einsum("ij,ij->i", x, np.cross(y, z)), minlength=2 * m)
+    return np.asarray(np.where(volume[island] < 0, -sign, sign))
 
 
 def vertex_normals(surface: Surface) -> FloatArray:
-    """(n', 3) unit normals at the vertices of a surface, outward."""
+    """(n', 3) outward unit normals at the vertices of a surface."""
     mesh, original = surface.mesh, surface.original
     corners = mesh.vertices[mesh.faces]
-    of_faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     sign = outward(surface.welded_faces, original.vertices[original.faces])
-    of_faces *= np.where(surface.face_of >= 0, sign[surface.face_of], 1.0)[:, None]
-    return _unit(indicator(mesh.faces.ravel(), mesh.n_vertices) @ np.repeat(of_faces, 3, axis=0))
+    normals *= np.where(surface.face_of >= 0, sign[surface.face_of], 1.0)[:, None]
+    return _normalized(indicator(mesh.faces.ravel(), mesh.n_vertices) @ np.repeat(normals, 3, axis=0))
 
 
 def smooth_normals(normals: FloatArray, flow: HeatFlow) -> FloatArray:
-    """(n', 3) unit normals, averaged by a flow over the surface."""
-    return _unit(flow.smooth(normals).astype(np.float64))
+    """(n', 3) unit normals, averaged by a heat flow."""
+    return _normalized(flow.smooth(normals).astype(np.float64))
 
 
 def curvature_across(surface: Surface, normals: FloatArray, adjacency: FaceAdjacency) -> FloatArray:
-    """(p,) curvature of a surface of area 1 from one face to its neighbor: negative in a crease, 3.5 on a sphere."""
-    original = surface.original
-    of_faces = _unit(surface.to_faces(normals))
-    centers = original.vertices[original.faces].mean(axis=1) / np.sqrt(original.area)
+    """(p,) curvature from one face to its neighbor, of a surface of area 1: negative in a crease, 3.5 on a sphere."""
+    face_normals = _normalized(surface.to_faces(normals))
+    centers = surface.original.unit_face_centers
     a, b = adjacency.pairs.T
-    step = centers[b] - centers[a]
-    squared = np.maximum(np.einsum("ij,ij->i", step, step), FLAT**2)
-    return np.asarray(np.einsum("ij,ij->i", of_faces[b] - of_faces[a], step) / squared)
+    offset = centers[b] - centers[a]
+    squared = np.maximum(np.einsum("ij,ij->i", offset, offset), LEAST_THICKNESS**2)
+    return np.asarray(np.einsum("ij,ij->i", face_normals[b] - face_normals[a], offset) / squared)
+
+
+def coarse_curvature(surface: Surface, adjacency: FaceAdjacency, flows: Flows) -> FloatArray:
+    """`curvature_across` between the original faces, without small details."""
+    return curvature_across(surface, smooth_normals(vertex_normals(surface), flows.over(COARSE)), adjacency)
 
 
 def log_thickness(
-    surface: Surface, normals: FloatArray, flows: Flows, tick: Callable[[float], None] | None = None
+    surface: Surface, normals: FloatArray, flows: Flows, progress: Progress | None = None
 ) -> FloatArray:
-    """(n',) logarithm of the radius of the largest ball that touches a surface of area 1 at a vertex from inside.
+    """(n',) logarithm of the radius of the largest inner ball that touches the surface at each vertex.
 
-    By the shrinking ball of Ma, Bae and Choi (2012), against the tangent planes of what it touches, so that a thin
-    sheet is seen on a coarse mesh too. `tick` is called with the share that is done, about.
+    In units of the square root of the area. By the shrinking ball of Ma, Bae and Choi (2012), against the tangent
+    planes of the points that it touches, so that a thin sheet is recognized on a coarse mesh as well.
     """
+    progress = Progress.of(progress)
     mesh = surface.mesh
     places = mesh.vertices / np.sqrt(mesh.area)
-    step = max(1, len(places) // MOST_BALLS)
-    points, directions = places[::step], normals[::step]
+    stride = max(1, len(places) // MOST_BALLS)
+    points, directions = places[::stride], normals[::stride]
     spacing = np.sqrt(2.3 / len(points))
     tree = cKDTree(points)
-    radius = np.full(len(points), WIDEST)
+    radius = np.full(len(points), LARGEST_RADIUS)
     active = np.arange(len(points))
-    for i in range(ROUNDS):
+    for i in range(MAX_SHRINKS):
         p, n = points[active], directions[active]
         distance, nearest = np.empty(len(active)), np.empty(len(active), dtype=np.int64)
-        for begun in range(0, len(active), AT_ONCE):
-            if tick:
-                tick(1 - 0.5**i * (1 - 0.5 * begun / len(active)))
-            some = slice(begun, begun + AT_ONCE)
-            # From the middle of a ball everything is equally near, and the exact search would look at all of it.
-            distance[some], nearest[some] = tree.query(p[some] - radius[active[some], None] * n[some], eps=SLACK)
+        for start in range(0, len(active), BALLS_AT_ONCE):
+            # Each round is taken for half of the time that is left.
+            progress(1 - 0.5**i * (1 - 0.5 * start / len(active)))
+            rows = slice(start, start + BALLS_AT_ONCE)
+            # From the middle of a ball all points are equally near, and an exact search would look at all of them.
+            middles = p[rows] - radius[active[rows], None] * n[rows]
+            distance[rows], nearest[rows] = tree.query(middles, eps=SEARCH_SLACK)
         inside = distance < radius[active] * (1 - 1e-4) - 1e-9
         active, nearest, p, n = active[inside], nearest[inside], p[inside], n[inside]
         if not len(active):
             break
-        smaller, rough = _touching(p, n, points[nearest], directions[nearest], spacing)
+        smaller, rough = _touching_balls(p, n, points[nearest], directions[nearest], spacing)
         active, smaller = active[~rough], smaller[~rough]
         radius[active] = np.minimum(smaller, radius[active])
-    if step > 1:
+    if stride > 1:
         radius = radius[tree.query(places)[1]]
-    logs = np.log(radius + FLAT)[:, None]
+    logs = np.log(radius + LEAST_THICKNESS)[:, None]
     return flows.over(THICKNESS_LENGTH).smooth(logs)[:, 0].astype(np.float64)
 
 
 def border_weights(
-    surface: Surface, adjacency: FaceAdjacency, tick: Callable[[float], None] | None = None
+    surface: Surface, adjacency: FaceAdjacency, progress: Progress | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """(p,) weight of the border between neighbors, 1 where nothing speaks for a cut, and the fine curvature there.
-
-    `tick` is called with the share that is done.
-    """
-    original = surface.original
+    """(p,) weights of the borders between neighbors, 1 where the surface is flat and even, and (p,) fine curvatures."""
     normals, flows = vertex_normals(surface), Flows(surface.mesh)
     fine, coarse = (smooth_normals(normals, flows.over(length)) for length in (FINE, COARSE))
-    thickness = surface.to_faces(log_thickness(surface, fine, flows, tick)[:, None])[:, 0]
+    thickness = surface.to_faces(log_thickness(surface, fine, flows, progress)[:, None])[:, 0]
     curvature = curvature_across(surface, coarse, adjacency)
-    centers = original.vertices[original.faces].mean(axis=1) / np.sqrt(original.area)
+    centers = surface.original.unit_face_centers
     a, b = adjacency.pairs.T
-    distances = np.maximum(np.linalg.norm(centers[a] - centers[b], axis=1), SHORTEST)
+    distances = np.maximum(np.linalg.norm(centers[a] - centers[b], axis=1), LEAST_DISTANCE)
     step = np.minimum(np.abs(thickness[a] - thickness[b]) / distances, MOST_STEP)
-    weights = np.exp(CREASE * np.clip(curvature, -MOST_CONCAVE, MOST_CONVEX) - STEP * step)
+    weights = np.exp(BORDER_CREASE * np.clip(curvature, -MOST_CONCAVE, MOST_CONVEX) - BORDER_STEP * step)
     return weights, curvature_across(surface, fine, adjacency)
 
 
-def _touching(
+def _touching_balls(
     p: FloatArray, n: FloatArray, q: FloatArray, m: FloatArray, spacing: float
 ) -> tuple[FloatArray, BoolArray]:
     """Radius of the balls that touch p (normal n) and q (normal m), and whether q is only roughness beside p."""
     between = p - q
     along = np.einsum("ij,ij->i", between, n)
     radius = np.einsum("ij,ij->i", between, between) / np.maximum(2 * along, 1e-9)
-    # The ball that touches the plane at q, where that is near to q and faces p.
+    # The ball that touches the tangent plane at q, if it does so near q and the plane faces p.
     facing = np.einsum("ij,ij->i", n, m)
-    flat = -np.einsum("ij,ij->i", between, m) / np.maximum(1 - facing, 1e-9)
-    touch = p + flat[:, None] * (m - n)
-    near = (facing < 0) & (flat > 0) & (np.einsum("ij,ij->i", touch - q, touch - q) < spacing**2)
-    radius = np.where(near, np.minimum(flat, radius), radius)
+    planar = -np.einsum("ij,ij->i", between, m) / np.maximum(1 - facing, 1e-9)
+    touch = p + planar[:, None] * (m - n)
+    near = (facing < 0) & (planar > 0) & (np.einsum("ij,ij->i", touch - q, touch - q) < spacing**2)
+    radius = np.where(near, np.minimum(planar, radius), radius)
     center = p - radius[:, None] * n
-    cosine = np.einsum("ij,ij->i", _unit(p - center), _unit(np.where(near[:, None], touch, q) - center))
-    return radius, np.asarray(cosine > NOISE)
+    cosine = np.einsum("ij,ij->i", _normalized(p - center), _normalized(np.where(near[:, None], touch, q) - center))
+    return radius, np.asarray(cosine > ROUGHNESS_COSINE)
 
 
-def _unit(vectors: FloatArray) -> FloatArray:
+def _normalized(vectors: FloatArray) -> FloatArray:
+    """(k, 3) vectors scaled to length 1."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-12)[:, None])

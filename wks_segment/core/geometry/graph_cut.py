@@ -1,8 +1,12 @@
-"""Borders that keep to the shape: labels as the minimum of an energy, in a narrow band around the borders.
+"""Borders that follow the shape: labels of least energy, in a narrow band around the borders that are there.
 
-The energy of Boykov, Veksler and Zabih, "Fast approximate energy minimization via graph cuts" (2001): what a label
-costs on a face, by its posterior, and what a border costs, by its length, less where people cut (concave creases, the
-minima rule of Hoffman and Richards 1984) and where the artist has marked edges. Minimized by their alpha expansion.
+The energy of Boykov, Veksler and Zabih, "Fast approximate energy minimization via graph cuts" (2001), is the cost of
+the labels of the faces, by their posteriors, and of the borders, by their lengths. Borders cost less where people cut
+(concave creases, the minima rule of Hoffman and Richards 1984) and where the user has marked edges. Their alpha
+expansion minimizes it.
+
+The expansion is ours, since SciPy has the maximum flow but no energies of labels; it builds the graph of each move
+without the auxiliary nodes of the paper, and the band keeps that graph small.
 """
 
 from __future__ import annotations
@@ -13,87 +17,80 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import breadth_first_order, dijkstra, maximum_flow
 
-from ..mesh.adjacency import FaceAdjacency
-from ..mesh.surface import Surface
+from ..mesh.adjacency import FaceGraph
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
-from .creases import COARSE, curvature_across, smooth_normals, vertex_normals
-from .heat_flow import Flows
 
-CREASE, MOST_CONCAVE, MOST_CONVEX = 0.05, 15.0, 0.0
-"""Weight of a border by e to this times its curvature, which is taken between these bounds. Creases come and go with
-the pose: at 0.4, which agrees best with people, segments are less the same in all poses …"""
-STRENGTH = 2.0
-"""What a border costs by its length, in units of the smoothing length. Less leaves borders where noise puts them."""
-WIDTH = 1.0
-"""How far a label may spread from the faces that have it, in units of the smoothing length."""
+CUT_CREASE, CUT_MOST_CONCAVE, CUT_MOST_CONVEX = 0.05, 15.0, 0.0
+"""A border is weighted by `exp(CUT_CREASE * clip(curvature, -CUT_MOST_CONCAVE, CUT_MOST_CONVEX))`. A crease weight of
+0.4 agrees best with people, but creases come and go with the pose, so that segments would differ more between poses …"""
+CUT_STRENGTH = 2.0
+"""Cost of a border by its length, in units of the smoothing length. Below, borders stay where noise puts them."""
+CUT_WIDTH = 1.0
+"""Distance that a label may spread from the faces that have it, in units of the smoothing length."""
 REGION_CREASE, REGION_WIDTH = 0.4, 2.0
-"""… but regions, which are fewer, are not."""
+"""… while regions, of which there are fewer, do not."""
 LEAST_POSTERIOR = 1e-3
-"""A posterior counts as no less than this: what is certain is no more certain than that."""
-LARGEST = 2.0**29
-"""Largest cost as a whole number. SciPy's flows are 32 bits wide, and what is left to flow back doubles it."""
-TINY = 1e-200
-"""What costs less than this costs nothing."""
-SHORTEST = 1e-12
-"""Distance between the centers of faces from which on they count as that far apart."""
-SWEEPS = 5
-"""Rounds over all labels at most. Two or three are usual."""
+"""Least posterior in the energy: a label of posterior 0 must not cost infinitely much."""
+LARGEST_COST = 2.0**29
+"""Largest cost as an integer. SciPy's flows have 32 bits, and the residual capacity can be twice the cost."""
+TINY_ENERGY = 1e-200
+"""Energies below this count as 0, since they cannot be scaled up to `LARGEST_COST`."""
+SHORTEST_PATH = 1e-12
+"""Least length of the path between neighboring faces, because an entry of 0 would mean that there is none."""
+MAX_SWEEPS = 5
+"""Most rounds over all labels. Two or three are usual."""
 
 
-def crease_weights(surface: Surface, adjacency: FaceAdjacency, crease: float = CREASE) -> FloatArray:
-    """(p,) weight of the border between neighbors among the original faces: 1 where flat or convex, less in creases.
+@dataclass(frozen=True)
+class CutStyle:
+    """Settings of a cut.
 
-    For `cut_borders`; where marked edges are to attract borders, to be multiplied by a number below 1 there.
+    Attributes
+    ----------
+    length : float
+        Smoothing length, in units of the square root of the total area.
+    crease : float
+        How much creases attract borders; see `CUT_CREASE`.
+    width : float
+        Distance that labels may spread, in units of `length`. It is measured between centers of faces, so that nothing
+        changes on a mesh whose faces are further apart.
+    strength : float
+        Cost of a border by its length, in units of `length`. With 0, the labels at the start stay.
     """
-    return weights_of_curvature(coarse_curvature(surface, adjacency, Flows(surface.mesh)), crease)
 
+    length: float
+    crease: float = CUT_CREASE
+    width: float = CUT_WIDTH
+    strength: float = CUT_STRENGTH
 
-def coarse_curvature(surface: Surface, adjacency: FaceAdjacency, flows: Flows) -> FloatArray:
-    """(p,) curvature of a surface of area 1 from one original face to its neighbor, but for what is small."""
-    return curvature_across(surface, smooth_normals(vertex_normals(surface), flows.over(COARSE)), adjacency)
+    def border_weights(self, curvature: FloatArray) -> FloatArray:
+        """(p,) weights of borders, given the curvature across them: 1 where flat or convex, less in creases.
 
-
-def weights_of_curvature(curvature: FloatArray, crease: float = CREASE) -> FloatArray:
-    """(p,) weight of borders across which a surface is curved, as `crease_weights` has it."""
-    return np.asarray(np.exp(crease * np.clip(curvature, -MOST_CONCAVE, MOST_CONVEX)))
+        Where marked edges are to attract borders, multiply the weights there by a number below 1.
+        """
+        return np.asarray(np.exp(self.crease * np.clip(curvature, -CUT_MOST_CONCAVE, CUT_MOST_CONVEX)))
 
 
 def cut_borders(
-    posteriors: FloatArray,
-    areas: FloatArray,
-    centers: FloatArray,
-    adjacency: FaceAdjacency,
-    weights: FloatArray,
-    length: float,
-    labels: IntArray | None = None,
-    strength: float = STRENGTH,
-    width: float = WIDTH,
+    posteriors: FloatArray, graph: FaceGraph, weights: FloatArray, style: CutStyle, labels: IntArray | None = None
 ) -> IntArray:
-    """Move the borders between labels, by no more than about a length, to where they are short and along creases.
+    """Move the borders between labels, by about `style.width` at most, to where they are short and along creases.
 
-    Each face keeps its label or takes one that is found nearby. The energy of the result is never above that of the
-    labels it started with. Nothing is drawn at random.
+    Each face keeps its label or takes one that occurs nearby. The energy never rises above that of the labels at the
+    start. The result does not depend on a random seed.
 
     Parameters
     ----------
     posteriors : (m, K) array
-        Of the labels, on each face; smoothed over `length`.
-    areas : (m,) array
-    centers : (m, 3) array
-        In the unit whose square is that of the areas.
-    adjacency : FaceAdjacency
-        Its lengths in the same unit. Pairs may repeat, as of polygons that share several edges.
+        Posteriors of the labels on each face, smoothed over `style.length`.
+    graph : FaceGraph
+        The m faces.
     weights : (p,) array
-        What each border costs by its length, 1 where nothing speaks for one; not negative. See `crease_weights`.
-    length : float
-        Smoothing length, in units of the square root of the total area.
+        Cost of each border by its length, at least 0; see `CutStyle.border_weights`.
+    style : CutStyle
     labels : (m,) int array, optional
-        To start from; -1: a face that takes no part. The likeliest of each face if not given.
-    strength : float
-        What a border costs, in units of `length`. 0 changes nothing if `labels` is not given.
-    width : float
-        How far labels may spread, in units of `length`. The center of a face counts, so nothing changes on a mesh that
-        is coarser than that.
+        Labels at the start; -1: a face without a label, which keeps none. The most likely label of each face if not
+        given.
 
     Returns
     -------
@@ -102,43 +99,44 @@ def cut_borders(
     Raises
     ------
     ValueError
-        If a weight is negative, or not a number.
+        If a weight is negative or not a number.
     """
     if not (weights >= 0).all():
         raise ValueError("a weight of a border must not be negative")
+    areas, adjacency = graph.areas, graph.adjacency
     labels = np.asarray(posteriors.argmax(axis=1) if labels is None else labels)
     unit = np.sqrt(areas.sum())
-    within = _labels_within(labels, posteriors.shape[1], centers, adjacency, width * length * unit)
+    within = _labels_within(labels, posteriors.shape[1], graph, style.width * style.length * unit)
     band = np.flatnonzero(within.any(axis=1))
     if not len(band):
         return labels.copy()
-    number = _numbered(band, len(labels))
-    # Outside the band nothing changes, but what touches it has a border with it.
-    beside = (number[adjacency.pairs] >= 0).any(axis=1) & (labels[adjacency.pairs] >= 0).all(axis=1)
-    pairs = adjacency.pairs[beside]
-    rim = np.unique(pairs[number[pairs] < 0])
-    number[rim] = len(band) + np.arange(len(rim))
-    some = np.append(band, rim)
-    data = -np.log(np.maximum(posteriors[some], LEAST_POSTERIOR)) * (areas[some] / unit**2)[:, None]
-    borders = strength * length / unit * weights[beside] * adjacency.lengths[beside]
-    energy = Energy.of(data, number[pairs], borders)
-    cut = labels.copy()
-    cut[some] = minimized(energy, labels[some], within[some])
-    return cut
+    node = _index_in(band, len(labels))
+    # Labels outside the band do not change, but faces there that touch the band have borders with it.
+    touching = (node[adjacency.pairs] >= 0).any(axis=1) & (labels[adjacency.pairs] >= 0).all(axis=1)
+    pairs = adjacency.pairs[touching]
+    rim = np.unique(pairs[node[pairs] < 0])
+    node[rim] = len(band) + np.arange(len(rim))
+    faces = np.append(band, rim)
+    data = -np.log(np.maximum(posteriors[faces], LEAST_POSTERIOR)) * (areas[faces] / unit**2)[:, None]
+    borders = style.strength * style.length / unit * weights[touching] * adjacency.lengths[touching]
+    energy = Energy.of(data, node[pairs], borders)
+    result = labels.copy()
+    result[faces] = minimize_energy(energy, labels[faces], within[faces])
+    return result
 
 
 @dataclass(frozen=True)
 class Energy:
-    """What labels cost: a sum over nodes and over pairs of neighbors with different labels, in whole numbers.
+    """Energy of a labeling: a sum over nodes, and over pairs of neighbors with different labels, in integers.
 
     Attributes
     ----------
     data : (n, K) int array
-        What each label costs at each node, not negative.
+        Cost of each label at each node, at least 0.
     pairs : (p, 2) int array
         Neighbors.
     borders : (p,) int array
-        What it costs if they differ.
+        Cost of different labels on the two.
     """
 
     data: IntArray
@@ -147,47 +145,49 @@ class Energy:
 
     @classmethod
     def of(cls, data: FloatArray, pairs: IntArray, borders: FloatArray) -> Energy:
-        """Costs as whole numbers, as large as flows can hold."""
-        # The flow through a node is at most what its label costs and all its borders.
+        """Energy with the given costs, scaled to integers as large as flows can hold."""
+        # The flow through a node is at most the cost of its label and of all its borders.
         data = data - data.min(axis=1, keepdims=True)
         around = np.bincount(pairs.ravel(), weights=np.repeat(borders, 2), minlength=len(data))
         largest = float((data.max(axis=1) + 2 * around).max())
-        scale = LARGEST / largest if largest > TINY else 0.0
+        scale = LARGEST_COST / largest if largest > TINY_ENERGY else 0.0
         return cls(np.rint(data * scale).astype(np.int64), pairs, np.rint(borders * scale).astype(np.int64))
 
     def at(self, labels: IntArray) -> int:
-        """The energy of (n,) labels."""
+        """Energy of (n,) labels."""
         differ = labels[self.pairs[:, 0]] != labels[self.pairs[:, 1]]
         return int(self.data[np.arange(len(labels)), labels].sum() + self.borders[differ].sum())
 
 
-def minimized(energy: Energy, labels: IntArray, allowed: BoolArray) -> IntArray:
-    """(n,) labels whose energy no expansion of one label lowers, if rounds suffice, and is not above that at first.
+def minimize_energy(energy: Energy, labels: IntArray, allowed: BoolArray) -> IntArray:
+    """(n,) labels whose energy is at most that of the labels at the start, by alpha expansion.
+
+    After fewer than `MAX_SWEEPS` rounds no expansion of a single label lowers the energy further.
 
     Parameters
     ----------
     energy : Energy
     labels : (n,) int array
-        To start from.
+        Labels at the start.
     allowed : (n, K) bool array
-        Which labels each node may take, beside the one that it starts with.
+        Labels that each node may take, besides the one at the start.
     """
     labels, allowed = labels.copy(), allowed.copy()
-    # Or what one label has taken, another could not take back.
+    # A node may always go back to its first label.
     allowed[np.arange(len(labels)), labels] = True
     spreading = np.flatnonzero(allowed.any(axis=0))
     by_label = np.ascontiguousarray(allowed.T)
     touching = {label: np.flatnonzero(by_label[label][energy.pairs].any(axis=1)) for label in spreading}
-    # A label need not be tried again until something has changed where it may spread, or beside that.
+    # A label is tried again only after a change where it may spread, or next to there.
     untried = np.ones(allowed.shape[1], dtype=bool)
-    for label in np.tile(spreading, SWEEPS):
+    for label in np.tile(spreading, MAX_SWEEPS):
         if not untried[label]:
             continue
         nodes = np.flatnonzero(by_label[label] & (labels != label))
-        takes = expansion(energy, labels, int(label), nodes, touching[label])
-        labels[takes] = label
+        switching = expansion(energy, labels, int(label), nodes, touching[label])
+        labels[switching] = label
         changed = np.zeros(len(labels), dtype=bool)
-        changed[takes] = True
+        changed[switching] = True
         around = energy.pairs[touching[label]]
         changed[around[changed[around].any(axis=1)]] = True
         untried |= allowed[changed].any(axis=0)
@@ -196,99 +196,98 @@ def minimized(energy: Energy, labels: IntArray, allowed: BoolArray) -> IntArray:
 
 
 def expansion(energy: Energy, labels: IntArray, label: int, nodes: IntArray, touching: IntArray) -> IntArray:
-    """Those of some nodes with other labels that take a label, so that the energy is as low as by that it can get.
+    """Nodes that switch to `label` in the optimal expansion move.
 
     Section 5 of Boykov, Veksler and Zabih, without their auxiliary nodes (Kolmogorov and Zabih, "What energy functions
-    can be minimized via graph cuts?", 2004). As few nodes as possible, so none if the energy does not fall.
+    can be minimized via graph cuts?", 2004). Of several optimal moves it is the one with the fewest nodes, so that none
+    switches if the energy does not fall.
 
     Parameters
     ----------
     energy : Energy
     labels : (n,) int array
-        As they are.
+        Labels before the move.
     label : int
     nodes : (k,) int array
-        Those that may take it.
+        Nodes with other labels that may switch.
     touching : (q,) int array
-        Pairs of the energy, at least all of which one end is among the nodes.
+        Indices of pairs of the energy; among them all pairs with an end in `nodes`.
     """
     n = len(nodes)
-    number = _numbered(nodes, len(labels))
-    # What it costs to take the label rather than keep one's own.
+    index = _index_in(nodes, len(labels))
+    # Cost of switching, instead of keeping the label.
     gain = energy.data[nodes, label] - energy.data[nodes, labels[nodes]]
     pairs, cost = energy.pairs[touching], energy.borders[touching]
-    a, b = number[pairs].T
+    a, b = index[pairs].T
     differ = labels[pairs[:, 0]] != labels[pairs[:, 1]]
-    now = np.where(differ, cost, 0)
-    for inside, outside, other in ((a, b, pairs[:, 1]), (b, a, pairs[:, 0])):
+    before = np.where(differ, cost, 0)
+    for inside, outside, neighbor in ((a, b, pairs[:, 1]), (b, a, pairs[:, 0])):
         fixed = (inside >= 0) & (outside < 0)
-        then = np.where(labels[other] != label, cost, 0)
-        gain += _sums(inside[fixed], (then - now)[fixed], n)
+        after = np.where(labels[neighbor] != label, cost, 0)
+        gain += _integer_sums(inside[fixed], (after - before)[fixed], n)
     both = (a >= 0) & (b >= 0)
-    a, b, cost, now = a[both], b[both], cost[both], now[both]
-    # With x = 1 for what takes the label, a pair costs: now + (cost − now) xa − cost xb + flow (1 − xa) xb.
-    gain += _sums(a, cost - now, n) - _sums(b, cost, n)
-    flow = 2 * cost - now
+    a, b, cost, before = a[both], b[both], cost[both], before[both]
+    # With x = 1 for a node that switches, a pair costs: before + (cost − before) xa − cost xb + flow (1 − xa) xb.
+    gain += _integer_sums(a, cost - before, n) - _integer_sums(b, cost, n)
+    flow = 2 * cost - before
     source, sink = n, n + 1
-    eager, loath = np.flatnonzero(gain < 0), np.flatnonzero(gain > 0)
+    eager, reluctant = np.flatnonzero(gain < 0), np.flatnonzero(gain > 0)
     if not len(eager):
         return nodes[:0]
-    rows = np.concatenate([np.full(len(eager), source), loath, b])
-    columns = np.concatenate([eager, np.full(len(loath), sink), a])
-    capacity = np.concatenate([-gain[eager], gain[loath], flow]).astype(np.int32)
-    graph = csr_matrix(coo_matrix((capacity, (rows, columns)), shape=(n + 2,) * 2))
-    left = graph - maximum_flow(graph, source, sink).flow
-    left.eliminate_zeros()
-    reached = breadth_first_order(left, source, return_predecessors=False)
+    rows = np.concatenate([np.full(len(eager), source), reluctant, b])
+    columns = np.concatenate([eager, np.full(len(reluctant), sink), a])
+    capacity = np.concatenate([-gain[eager], gain[reluctant], flow]).astype(np.int32)
+    network = csr_matrix(coo_matrix((capacity, (rows, columns)), shape=(n + 2,) * 2))
+    residual = network - maximum_flow(network, source, sink).flow
+    residual.eliminate_zeros()
+    reached = breadth_first_order(residual, source, return_predecessors=False)
     return np.asarray(nodes[np.sort(reached[reached < n])])
 
 
-def _sums(owner: IntArray, values: IntArray, count: int) -> IntArray:
-    """(count,) sums of whole numbers, each below 2⁵³: a float holds them exactly."""
+def _integer_sums(owner: IntArray, values: IntArray, count: int) -> IntArray:
+    """(count,) sums of integers by owner; exact, as long as they stay below 2⁵³."""
     return np.bincount(owner, weights=values, minlength=count).astype(np.int64)
 
 
-def _labels_within(
-    labels: IntArray, count: int, centers: FloatArray, adjacency: FaceAdjacency, distance: float
-) -> BoolArray:
-    """(m, count) whether a face has another label than this one, but is no further than a distance from a face of it.
+def _labels_within(labels: IntArray, count: int, graph: FaceGraph, distance: float) -> BoolArray:
+    """(m, count) whether a face with another label is within a distance of a face with this label.
 
-    By ways over the surface, from center to center.
+    Distances are lengths of paths over the surface, from center to center.
     """
-    m = len(labels)
+    m, adjacency, centers = len(labels), graph.adjacency, graph.centers
     within = np.zeros((m, count), dtype=bool)
     pairs = adjacency.pairs[(labels[adjacency.pairs] >= 0).all(axis=1)]
     border = np.unique(pairs[labels[pairs[:, 0]] != labels[pairs[:, 1]]])
     if not len(border):
         return within
-    ways = _ways(pairs, np.linalg.norm(centers[pairs[:, 0]] - centers[pairs[:, 1]], axis=1), m)
-    near = np.flatnonzero(_distances(ways, border, distance) <= distance)
-    number, ways = _numbered(near, m), ways[near][:, near]
+    paths = _path_graph(pairs, np.linalg.norm(centers[pairs[:, 0]] - centers[pairs[:, 1]], axis=1), m)
+    near = np.flatnonzero(_distances(paths, border, distance) <= distance)
+    index, paths = _index_in(near, m), paths[near][:, near]
     for label in np.unique(labels[border]):
-        sources = number[border[labels[border] == label]]
-        within[near, label] = _distances(ways, sources, distance) <= distance
+        sources = index[border[labels[border] == label]]
+        within[near, label] = _distances(paths, sources, distance) <= distance
     within[labels >= 0, labels[labels >= 0]] = False
     return within
 
 
-def _ways(pairs: IntArray, lengths: FloatArray, count: int) -> csr_matrix:
-    """(count, count) ways from one node to the next, there and back."""
+def _path_graph(pairs: IntArray, lengths: FloatArray, count: int) -> csr_matrix:
+    """(count, count) symmetric matrix of the lengths of the paths between neighboring nodes."""
     low, high = pairs.min(axis=1), pairs.max(axis=1)
-    # Of repeated pairs the shortest counts, not the sum; a way of length 0 would be none.
+    # A sparse matrix would add the lengths of a pair that occurs several times; only the shortest counts.
     order = np.lexsort((lengths, high, low))
-    low, high, lengths = low[order], high[order], np.maximum(lengths[order], SHORTEST)
+    low, high, lengths = low[order], high[order], np.maximum(lengths[order], SHORTEST_PATH)
     first = np.append(True, (np.diff(low) != 0) | (np.diff(high) != 0))
-    graph = coo_matrix((lengths[first], (low[first], high[first])), shape=(count,) * 2).tocsr()
-    return csr_matrix(graph + graph.T)
+    half = coo_matrix((lengths[first], (low[first], high[first])), shape=(count,) * 2).tocsr()
+    return csr_matrix(half + half.T)
 
 
-def _distances(ways: csr_matrix, sources: IntArray, most: float) -> FloatArray:
-    """(n,) length of the shortest way from any source, infinite above `most`."""
-    return np.asarray(dijkstra(ways, indices=sources, min_only=True, limit=most))
+def _distances(paths: csr_matrix, sources: IntArray, limit: float) -> FloatArray:
+    """(n,) length of the shortest path from any source, infinite above a limit."""
+    return np.asarray(dijkstra(paths, indices=sources, min_only=True, limit=limit))
 
 
-def _numbered(some: IntArray, count: int) -> IntArray:
-    """(count,) place of each index among some of them, -1 for others."""
-    number = np.full(count, -1)
-    number[some] = np.arange(len(some))
-    return number
+def _index_in(subset: IntArray, count: int) -> IntArray:
+    """(count,) index of each number in a subset of 0, 1, …, -1 for the others."""
+    index = np.full(count, -1)
+    index[subset] = np.arange(len(subset))
+    return index

@@ -1,4 +1,4 @@
-"""Averages over the surface, by the flow of heat: the same on any meshing."""
+"""Averages over the surface by heat flow, which do not depend on the meshing."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ from ..spectral.coarsening import Level
 from ..spectral.laplacian import stiffness_matrix, unit_area_masses
 from ..spectral.multifrontal import Dissection, NestedDissectionFactor, SingularError, nested_dissection
 
-LARGE = 200_000
-"""Vertices from which values are smoothed on cells."""
+CELLS_ABOVE = 200_000
+"""Number of vertices above which values are smoothed on cells: time and memory of a factor grow faster than the mesh."""
 CELLS_PER_LENGTH = 2.0
 """Cells in a row along the smoothing length."""
 LEAST_CELLS = 4_000
-KEPT, MOST_VERTICES = 5, 60_000
-"""Flows that are kept, of a mesh of up to so many vertices: one takes five megabytes for 10,000."""
+"""Least number of cells, for long smoothing lengths."""
+FLOWS_KEPT, FLOWS_KEPT_UP_TO = 5, 60_000
+"""Number of flows that are kept, for a mesh of up to so many vertices: a flow takes 5 MB for 10,000 vertices."""
 
 
 class _Factor(Protocol):
@@ -31,40 +32,40 @@ class _Factor(Protocol):
 class HeatFlow:
     """One implicit step of heat flow, (M + t S) u' = M u with t = length².
 
-    Factored once, for any number of functions; on a large surface on cells a fraction of the length wide.
+    The system is factored once, for any number of functions; on a large surface it is solved on cells that are a
+    fraction of the length wide.
 
     Parameters
     ----------
     mesh : TriangleMesh
     length : float
-        Over about which values are averaged, in units of the square root of the area.
-    ground : optional
-        `_Ground(mesh)`, where it is there already.
+        Length over which values are averaged, in units of the square root of the area.
+    system : optional
+        `FlowSystem(mesh)`, if it exists already.
     """
 
-    def __init__(self, mesh: TriangleMesh, length: float, ground: _Ground | None = None) -> None:
-        ground = ground or _Ground(mesh)
-        level, dissection = ground.level, None
+    def __init__(self, mesh: TriangleMesh, length: float, system: FlowSystem | None = None) -> None:
+        system = system or FlowSystem(mesh)
+        level, dissection = system.level, None
         self._mass, self._prolongation = level.mass, None
-        if len(level.areas) > LARGE:
+        if len(level.areas) > CELLS_ABOVE:
             cells = max(round((CELLS_PER_LENGTH / length) ** 2), LEAST_CELLS)
             self._prolongation, level = level.coarsened(cells)
             self._mass = csr_matrix(self._prolongation.T @ self._mass)
         else:
-            dissection = ground.dissection
-        system = _system(level, length)
+            dissection = system.dissection
         factor: NestedDissectionFactor | None
         try:
-            factor = NestedDissectionFactor(system, level.positions, dissection=dissection)
+            factor = NestedDissectionFactor(_matrix(level, length), level.positions, dissection=dissection)
         except SingularError:
             factor = None
         if factor is not None and not factor.n_negative:
             self._factor: _Factor = factor
         else:
-            # Slivers weigh so much more than areas that single precision loses these.
-            masses = diags(unit_area_masses(ground.unit))
+            # Next to the weights of slivers, the areas are lost in single precision.
+            masses = diags(unit_area_masses(system.unit_mesh))
             self._mass, self._prolongation = csr_matrix(masses), None
-            self._factor = splu(csc_matrix(masses + length**2 * stiffness_matrix(ground.unit)))
+            self._factor = splu(csc_matrix(masses + length**2 * stiffness_matrix(system.unit_mesh)))
 
     def smooth(self, values: FloatArray) -> FloatArray:
         """(n, k) values at vertices, averaged over the surface within about the length."""
@@ -73,39 +74,40 @@ class HeatFlow:
 
 
 class Flows:
-    """The heat flows of one mesh by length, each factored once; the last few are kept, unless the mesh is large."""
+    """Heat flows of one mesh by length, each factored once; the last few are kept, unless the mesh is large."""
 
     def __init__(self, mesh: TriangleMesh) -> None:
         self._mesh = mesh
-        self._ground: _Ground | None = None
-        self._kept: OrderedDict[float, HeatFlow] = OrderedDict()
+        self._system: FlowSystem | None = None
+        self._flows: OrderedDict[float, HeatFlow] = OrderedDict()
 
     def over(self, length: float) -> HeatFlow:
-        """The flow over a length."""
-        if length in self._kept:
-            self._kept.move_to_end(length)
-            return self._kept[length]
-        if self._mesh.n_vertices > MOST_VERTICES:
+        """Flow that averages over a length."""
+        if length in self._flows:
+            self._flows.move_to_end(length)
+            return self._flows[length]
+        if self._mesh.n_vertices > FLOWS_KEPT_UP_TO:
             return HeatFlow(self._mesh, length)
-        self._ground = self._ground or _Ground(self._mesh)
-        self._kept[length] = HeatFlow(self._mesh, length, self._ground)
-        if len(self._kept) > KEPT:
-            self._kept.popitem(last=False)
-        return self._kept[length]
+        self._system = self._system or FlowSystem(self._mesh)
+        self._flows[length] = HeatFlow(self._mesh, length, self._system)
+        if len(self._flows) > FLOWS_KEPT:
+            self._flows.popitem(last=False)
+        return self._flows[length]
 
 
-class _Ground:
-    """What flows over all lengths have in common."""
+class FlowSystem:
+    """Matrices and elimination order that the flows of one mesh over all lengths share."""
 
     def __init__(self, mesh: TriangleMesh) -> None:
-        self.unit = mesh.with_unit_area()
-        self.level = Level.of(self.unit)
+        self.unit_mesh = mesh.with_unit_area()
+        self.level = Level.of(self.unit_mesh)
 
     @cached_property
     def dissection(self) -> Dissection:
-        """Of the system that a flow solves: its entries are at the same places for every length."""
-        return nested_dissection(_system(self.level, 1.0), self.level.positions)
+        """Elimination order: the matrix has entries at the same positions for every length."""
+        return nested_dissection(_matrix(self.level, 1.0), self.level.positions)
 
 
-def _system(level: Level, length: float) -> csr_matrix:
+def _matrix(level: Level, length: float) -> csr_matrix:
+    """M + length² S."""
     return csr_matrix(level.mass + np.float32(length**2) * level.stiffness)

@@ -1,1 +1,1 @@
-"""Triangle meshes: arrays, neighbors, repair, subdivision, islands, and the closed surface they become."""
+"""Triangle meshes: arrays, neighbors, repair, subdivision, islands, and the surface on which eigenpairs are computed."""

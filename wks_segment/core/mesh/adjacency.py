@@ -1,4 +1,4 @@
-"""Which faces hang together: neighbors, connected regions, crumbs."""
+"""Neighbors among faces, the connected regions of a labeling, and the removal of regions that are too small."""
 
 from __future__ import annotations
 
@@ -7,20 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from .triangle_mesh import BoolArray, FloatArray, IntArray, edges_of
+from .triangle_mesh import BoolArray, FloatArray, IntArray, components_of_pairs, edges_of
 
 
 @dataclass(frozen=True)
 class FaceAdjacency:
-    """Which faces share an edge.
+    """Pairs of faces that share an edge.
 
     Attributes
     ----------
     pairs : (p, 2) int array
-        Faces on the two sides of an edge. Where more than two faces meet, they form a chain.
+        The faces on the two sides of an edge. Three or more faces at one edge form a chain of pairs.
     lengths : (p,) array
         Length of that edge.
     """
@@ -30,128 +29,149 @@ class FaceAdjacency:
 
     @classmethod
     def of(cls, faces: IntArray, vertices: FloatArray) -> FaceAdjacency:
-        """Find the neighbors of (m, 3) faces with corners in (n, 3) vertices."""
+        """Neighbors among (m, 3) faces with corners in (n, 3) vertices."""
         edges = edges_of(faces)
         order = np.lexsort((edges[:, 1], edges[:, 0]))
-        edges, owner = edges[order], order // 3
+        edges, face = edges[order], order // 3
         same = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
         lengths = np.linalg.norm(vertices[edges[same, 0]] - vertices[edges[same, 1]], axis=1)
-        return cls(np.stack([owner[same], owner[same + 1]], axis=1), lengths)
+        return cls(np.stack([face[same], face[same + 1]], axis=1), lengths)
 
     def across(self, polygon_of: IntArray) -> BoolArray:
-        """(p,) whether the two sides are of different polygons, given the polygon of each face (-1: none)."""
+        """(p,) whether the two faces belong to different polygons, given the polygon of each face (-1: none)."""
         pairs = polygon_of[self.pairs]
         return np.asarray((pairs[:, 0] != pairs[:, 1]) & (pairs >= 0).all(axis=1))
 
     def between_polygons(self, polygon_of: IntArray) -> FaceAdjacency:
-        """The same borders between polygons, given the polygon of each face (-1: none); those inside one drop out."""
+        """Neighbors among polygons, given the polygon of each face (-1: none); edges inside a polygon drop out."""
         across = self.across(polygon_of)
         return FaceAdjacency(polygon_of[self.pairs[across]], self.lengths[across])
 
     def among(self, pairs: IntArray) -> BoolArray:
-        """(p,) whether the border is one of (q, 2) others, whichever face comes first."""
-        most = 1 + max(int(self.pairs.max(initial=0)), int(np.max(pairs, initial=0)))
-        here, there = (np.sort(each, axis=1) @ np.array([most, 1]) for each in (self.pairs, pairs))
-        return np.isin(here, there)
+        """(p,) whether each pair is one of (q, 2) given pairs, in either order."""
+        base = 1 + max(int(self.pairs.max(initial=0)), int(np.max(pairs, initial=0)))
+        own_keys, given_keys = (np.sort(array, axis=1) @ np.array([base, 1]) for array in (self.pairs, pairs))
+        return np.isin(own_keys, given_keys)
+
+
+@dataclass(frozen=True)
+class FaceGraph:
+    """Faces or polygons as the nodes of a graph.
+
+    Attributes
+    ----------
+    areas : (m,) array
+    centers : (m, 3) array
+        In the unit whose square is that of the areas.
+    adjacency : FaceAdjacency
+        Its lengths in the same unit. A pair may occur several times, as for polygons that share several edges.
+    """
+
+    areas: FloatArray
+    centers: FloatArray
+    adjacency: FaceAdjacency
 
 
 def connected_regions(labels: IntArray, adjacency: FaceAdjacency) -> IntArray:
-    """(m,) connected part of each face: faces of one label that hang together by edges, numbered 0, 1, …
+    """(m,) connected region of each face: faces with one label that are connected across edges.
 
-    Numbered by label first, within a label by the lowest face.
+    Regions are numbered 0, 1, … by label, and those of one label by their lowest face.
     """
-    inside = adjacency.pairs[labels[adjacency.pairs[:, 0]] == labels[adjacency.pairs[:, 1]]]
-    graph = coo_matrix((np.ones(len(inside)), (inside[:, 0], inside[:, 1])), shape=(len(labels),) * 2)
-    part = connected_components(graph, directed=False)[1]
-    first = np.unique(part, return_index=True)[1]
-    rank = np.empty(len(first), dtype=np.int64)
-    rank[np.lexsort((first, labels[first]))] = np.arange(len(first))
-    return rank[part]
+    pairs = adjacency.pairs
+    region = components_of_pairs(pairs[labels[pairs[:, 0]] == labels[pairs[:, 1]]], len(labels))
+    first_face = np.unique(region, return_index=True)[1]
+    number = np.empty(len(first_face), dtype=np.int64)
+    number[np.lexsort((first_face, labels[first_face]))] = np.arange(len(first_face))
+    return number[region]
 
 
-def merge_crumbs(
-    labels: IntArray,
-    areas: FloatArray,
-    centers: FloatArray,
-    adjacency: FaceAdjacency,
-    min_share: float,
-    least_of_largest: float = 0.0,
+def merge_small_regions(
+    labels: IntArray, graph: FaceGraph, min_share: float, min_share_of_largest: float = 0.0
 ) -> tuple[IntArray, FaceAdjacency]:
-    """Give every connected region under a share of the area the label of a neighbor.
+    """Give every connected region below a share of the area the label of a neighbor.
 
-    The smallest goes first, to the neighbor with which it shares most border. A loose piece that is too small as a
-    whole takes the label of the face nearest to it that belongs to a large enough region, as an eye does that of its
-    head, and counts as adjacent to it from then on.
+    The smallest region goes first, to the neighbor with which it shares the longest border. An island that is too small
+    as a whole takes the label of the nearest face of a region that is large enough, as an eye takes that of its head,
+    and counts as adjacent to that face afterwards.
 
     Parameters
     ----------
     labels : (m,) int array
-        -1: a face that takes no part.
-    areas : (m,) array
-    centers : (m, 3) array
-    adjacency : FaceAdjacency
+        -1: a face without a label, which keeps none.
+    graph : FaceGraph
     min_share : float
         Between 0 and 1.
-    least_of_largest : float
-        A region is a crumb as well under this share of the largest one with its label, as the narrow band between two
-        others where the labels pass through a third.
+    min_share_of_largest : float
+        A region below this share of the largest region with its label is merged as well: for example the narrow band
+        of a third label where one label passes into another.
 
     Returns
     -------
-    (m,) int array of labels, and the adjacency with the loose pieces tied to what adopted them.
+    (m,) int array of labels, and the adjacency with the merged islands tied to their nearest faces.
     """
+    adjacency = graph.adjacency
     region = connected_regions(labels, adjacency)
     count = region.max() + 1
-    size = np.bincount(region, weights=areas, minlength=count)
+    size = np.bincount(region, weights=graph.areas, minlength=count)
     label_of = np.zeros(count, dtype=np.int64)
     label_of[region] = labels
-    least = min_share * areas.sum()
+    least = min_share * graph.areas.sum()
     largest = np.zeros(int(labels.max()) + 2)
     np.maximum.at(largest, label_of + 1, size)
-    stray = size < least_of_largest * largest[label_of + 1]
+    minor = size < min_share_of_largest * largest[label_of + 1]
 
-    borders = _border_lengths(region, adjacency)
-    owner = np.arange(count)
-
-    def root(i: int) -> int:
-        while owner[i] != i:
-            owner[i] = owner[owner[i]]
-            i = int(owner[i])
-        return i
-
-    for crumb in np.argsort(size, kind="stable"):
-        # A crumb may have grown by smaller ones before its turn; what is stray remains so.
-        if owner[crumb] != crumb or (size[crumb] >= least and not stray[crumb]):
-            continue
-        shared: dict[int, float] = defaultdict(float)
-        for neighbor, length in borders[crumb].items():
-            shared[root(neighbor)] += length
-        shared.pop(int(crumb), None)
-        if not shared:
-            continue
-        target = max(shared, key=lambda i: (shared[i], -i))
-        # Neighbors of the crumb's label are one region with it only from now on, and keep their own borders.
-        owner[crumb] = target
-        size[target] += size[crumb]
-        for neighbor, length in borders.pop(int(crumb)).items():
-            borders[target][neighbor] = borders[target].get(neighbor, 0.0) + length
-    owner = np.array([root(i) for i in range(count)])
-    merged = label_of[owner][region]
-    loose = (size[owner][region] < least) & (merged >= 0)
-    large = ~loose & (merged >= 0)
-    if not (loose.any() and large.any()):
+    target = _merge_targets(size, minor, least, _border_lengths(region, adjacency))
+    merged = label_of[target][region]
+    islands = (size[target][region] < least) & (merged >= 0)
+    large = ~islands & (merged >= 0)
+    if not (islands.any() and large.any()):
         return merged, adjacency
-    loose, large = np.flatnonzero(loose), np.flatnonzero(large)
-    adopting = large[cKDTree(centers[large]).query(centers[loose])[1]]
-    merged[loose] = merged[adopting]
-    ties = np.stack([loose, adopting], axis=1)
+    small_faces, large_faces = np.flatnonzero(islands), np.flatnonzero(large)
+    nearest = large_faces[cKDTree(graph.centers[large_faces]).query(graph.centers[small_faces])[1]]
+    merged[small_faces] = merged[nearest]
+    ties = np.stack([small_faces, nearest], axis=1)
     return merged, FaceAdjacency(
         np.concatenate([adjacency.pairs, ties]), np.concatenate([adjacency.lengths, np.zeros(len(ties))])
     )
 
 
+def _merge_targets(
+    size: FloatArray, minor: BoolArray, least: float, borders: dict[int, dict[int, float]]
+) -> IntArray:
+    """(r,) region that each of r regions ends up in, merging small ones in order of size; updates `size` in place.
+
+    `minor` regions are merged whatever their size is, others below `least`.
+    """
+    owner = np.arange(len(size))
+    for region in np.argsort(size, kind="stable").tolist():
+        # Its size may have grown by smaller regions before its turn.
+        if size[region] >= least and not minor[region]:
+            continue
+        shared: dict[int, float] = defaultdict(float)
+        for neighbor, length in borders[region].items():
+            shared[_root(owner, neighbor)] += length
+        shared.pop(region, None)
+        if not shared:
+            continue
+        target = max(shared, key=lambda i: (shared[i], -i))
+        # Neighbors with the target's label become one region with it only now, and keep their own borders.
+        owner[region] = target
+        size[target] += size[region]
+        for neighbor, length in borders.pop(region).items():
+            borders[target][neighbor] = borders[target].get(neighbor, 0.0) + length
+    return np.array([_root(owner, i) for i in range(len(size))])
+
+
+def _root(owner: IntArray, i: int) -> int:
+    """Region that region i was merged into in the end; shortens the way there for the next call."""
+    while owner[i] != i:
+        owner[i] = owner[owner[i]]
+        i = int(owner[i])
+    return i
+
+
 def _border_lengths(region: IntArray, adjacency: FaceAdjacency) -> dict[int, dict[int, float]]:
-    """For each region the length of border that it shares with each neighbor."""
+    """Length of the border that each region shares with each of its neighbors."""
     a, b = region[adjacency.pairs].T
     across = a != b
     shape = (int(region.max()) + 1,) * 2

@@ -1,8 +1,8 @@
-"""From the mesh that an artist made to the surface that the operator lives on, and back.
+"""Surface: the welded, repaired and refined copy of a mesh on which eigenpairs are computed, and the way back.
 
-An artist's mesh can have a vertex several times at one place (seams of imported files), spikes and holes, loose parts,
-and too few vertices for hundreds of eigenpairs. The surface is welded, repaired, refined and tied together; `Surface`
-carries values back to the artist's own vertices and faces.
+A user's mesh can have several vertices at one position (seams of imported files), spikes, holes, islands, and too few
+vertices for hundreds of eigenpairs. The surface is welded, repaired and refined, and its islands are tied together.
+`Surface` carries values back to the vertices and faces of the mesh.
 """
 
 from __future__ import annotations
@@ -12,51 +12,62 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from .islands import ties_between_pieces
+from ..message import Message, message_of
+from .islands import ties_between_islands
 from .repair import small_holes, without_spikes
 from .subdivision import split_long_edges
-from .triangle_mesh import BoolArray, FloatArray, IntArray, TriangleMesh, components_of, repeats_a_vertex, unique_edges
+from .triangle_mesh import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    TriangleMesh,
+    components_of_pairs,
+    islands_of_vertices,
+    repeats_a_vertex,
+    unique_edges,
+)
 
 Pieces = Literal["joined", "separate"]
-"""Loose parts tied to what they are nearest to, or each with a spectrum of its own."""
+"""What happens to the islands of a mesh: each is tied to the nearest one, or has a spectrum of its own."""
 
 WELD_TOLERANCE = 1e-6
-"""Distance under which two border vertices are one, as a fraction of the bounding box's diagonal …"""
-WELD_SHARE = 0.01
-"""… and of the median edge at most: a vertex far away makes the box large."""
-LEAST_PIECE = {"joined": 1e-6, "separate": 1e-3}
-"""A loose part below this share of the area stays out of the operator. By itself it would cost a zero mode and say
-nothing."""
-EDGE = 1.4
-"""Longest edge, in units of the square root of the area of a vertex: even triangles have edges of 1.07."""
-MOST_NEW = 4
-"""Vertices that refining adds at most, in units of those asked for: thin triangles would need very many."""
-MOST_PIECES = {"joined": 1000, "separate": 100}
-"""Loose parts that the operator sees at most, the largest ones."""
+"""Largest distance between two border vertices that are welded, as a fraction of the bounding box's diagonal: rounding
+of imported files is below it."""
+WELD_EDGE_SHARE = 0.01
+"""The same as a fraction of the median edge; the smaller of both counts, since one far vertex makes the box large."""
+LEAST_ISLAND_SHARE = {"joined": 1e-6, "separate": 1e-3}
+"""Islands below this share of the area are left out of the surface. A separate one would cost a zero mode of its own
+and tell nothing."""
+MOST_ISLANDS = {"joined": 1000, "separate": 100}
+"""Largest number of islands in the surface; the largest ones stay."""
+LONGEST_EDGE = 1.4
+"""Longest edge after refinement, in units of the square root of a vertex's area; edges of equilateral triangles measure
+1.07."""
+MOST_NEW_VERTICES = 4
+"""Most vertices that refinement adds, in units of `min_vertices`: thin triangles would need very many."""
 
 
 @dataclass(frozen=True)
 class Surface:
-    """A welded and refined copy of an original mesh.
+    """A welded, repaired and refined copy of a mesh.
 
     Attributes
     ----------
     original : TriangleMesh
-        The mesh as it came.
+        The mesh as it was given.
     mesh : TriangleMesh
-        The surface: no two vertices at one place along seams, every vertex in a face, no spikes, small holes closed,
-        fine enough, loose parts linked.
+        The copy: seams welded, every vertex in a face, no spikes, small holes closed, edges short enough, islands
+        linked.
     vertex_of : (n,) int array
-        The vertex of `mesh` that stands for each vertex of `original`; the nearest one, for vertices without a face
-        and those of loose parts that are left out.
+        The vertex of `mesh` that stands for each vertex of `original`: for a vertex without a face or of an island that
+        is left out, the nearest one.
     face_of : (m',) int array
-        The face of `original` that each face of `mesh` is a piece of; -1 for those that close a hole.
+        The face of `original` that contains each face of `mesh`; -1 for faces that close a hole.
     welded_faces : (m, 3) int array
-        The faces of `original`, with one number for all vertices at one place: what is adjacent on the surface.
+        The faces of `original` with one number for all vertices that are welded: neighbors on the surface share edges.
     """
 
     original: TriangleMesh
@@ -67,38 +78,38 @@ class Surface:
 
     @property
     def n_components(self) -> int:
-        """Number of loose parts of `mesh`, each with a zero mode of its own."""
+        """Number of islands of `mesh` that are not linked, each with a zero mode of its own."""
         return int(self.mesh.components.max()) + 1
 
     def to_vertices(self, values: FloatArray) -> FloatArray:
-        """Carry (n', …) values at vertices of the surface back to the (n, …) original vertices."""
+        """(n, …) values at the original vertices, from (n', …) values at the vertices of the surface."""
         return values[self.vertex_of]
 
     def to_faces(self, values: FloatArray) -> FloatArray:
-        """Average (n', k) values at vertices of the surface over each of the (m, k) original faces, by area."""
+        """(m, k) area-weighted means over the original faces, of (n', k) values at the vertices of the surface."""
         areas = self.mesh.face_areas
-        sum_over = indicator(self.face_of, self.original.n_faces)
-        total = sum_over @ areas
-        at_pieces = values[self.mesh.faces].mean(axis=1)
-        at_faces = sum_over @ (at_pieces * areas[:, None]) / np.where(total > 0, total, 1)[:, None]
-        # A face that is not on the surface, or has no area, has no piece to average over: its corners speak for it.
+        sums = indicator(self.face_of, self.original.n_faces)
+        total = sums @ areas
+        face_values = values[self.mesh.faces].mean(axis=1)
+        means = sums @ (face_values * areas[:, None]) / np.where(total > 0, total, 1)[:, None]
+        # A face that is not on the surface, or has no area, takes the mean of its corners.
         without = total <= 0
-        at_faces[without] = values[self.vertex_of[self.original.faces[without]]].mean(axis=1)
-        return at_faces
+        means[without] = values[self.vertex_of[self.original.faces[without]]].mean(axis=1)
+        return means
 
 
 @dataclass(frozen=True)
 class Connection:
-    """What is one surface, decided once for all poses of a mesh.
+    """Welding, faces and ties of a surface, decided once for all poses of a mesh.
 
     Attributes
     ----------
     welded : (n,) int array
-        For each vertex, the lowest-numbered vertex that it is joined with.
+        The lowest vertex that each vertex is welded with, possibly itself.
     kept : (m,) bool array
-        Whether each face takes part in the operator.
+        Whether each face is part of the surface.
     ties : (t, 2) int array
-        Pairs of welded vertices that tie loose parts together.
+        Pairs of welded vertices that tie islands together.
     """
 
     welded: IntArray
@@ -107,17 +118,17 @@ class Connection:
 
 
 def connect(*poses: TriangleMesh, rest: TriangleMesh | None = None, pieces: Pieces = "joined") -> Connection:
-    """Find out what is one surface in all poses of one mesh: what is welded, what takes part, what is tied together.
+    """Decide what the surface of all poses of one mesh is: which vertices are welded, which islands are kept and tied.
 
     Parameters
     ----------
     poses
-        The same faces between vertices at other places; pieces that meet in some poses only stay apart in all.
+        Meshes with the same faces and other positions. Vertices that meet in some poses only are not welded.
     rest : TriangleMesh, optional
-        The same mesh as it was modeled. Loose parts are then tied as they are there, and so in the same way for poses
-        that are not here.
+        The same mesh in its rest position. Islands are then tied where they are near to each other there, so that
+        the ties do not depend on the given poses.
     pieces : "joined" or "separate"
-        Whether loose parts are tied together.
+        Whether islands are tied together.
 
     Raises
     ------
@@ -130,41 +141,42 @@ def connect(*poses: TriangleMesh, rest: TriangleMesh | None = None, pieces: Piec
     kept = ~repeats_a_vertex(faces)
     if not kept.any():
         raise ValueError("every face of the mesh collapses when vertices at the same position are joined")
-    kept[kept] = _in_large_pieces(first, faces[kept], pieces)
+    kept[kept] = _in_large_islands(first, faces[kept], pieces)
     ties = np.zeros((0, 2), dtype=np.int64)
     if pieces == "joined":
-        ties = ties_between_pieces(faces[kept], *(pose.vertices for pose in (poses if rest is None else [rest])))
+        ties = ties_between_islands(faces[kept], *(pose.vertices for pose in (poses if rest is None else [rest])))
     return Connection(welded, kept, ties)
 
 
 def connect_alike(meshes: Sequence[TriangleMesh], names: Sequence[str], pieces: Pieces = "joined") -> list[Connection]:
-    """`connect` for several meshes, those with the same faces as poses of one; errors begin with a mesh's name."""
-    found: list[Connection] = []
-    alike = [next(j for j, other in enumerate(meshes) if np.array_equal(mesh.faces, other.faces)) for mesh in meshes]
-    for i, first in enumerate(alike):
-        group = [mesh for mesh, other in zip(meshes, alike, strict=True) if other == i]
+    """`connect` for several meshes: those with the same faces are poses of one mesh. Errors begin with a mesh's name."""
+    connections: list[Connection] = []
+    firsts = [next(j for j, other in enumerate(meshes) if np.array_equal(mesh.faces, other.faces)) for mesh in meshes]
+    for i, first in enumerate(firsts):
+        poses = [mesh for mesh, other in zip(meshes, firsts, strict=True) if other == i]
         try:
-            found.append(connect(*group, pieces=pieces) if first == i else found[first])
+            connections.append(connect(*poses, pieces=pieces) if first == i else connections[first])
         except ValueError as error:
-            raise ValueError(f"{names[i]}: {error}") from error
-    return found
+            raise ValueError(Message("{name}: {reason}", name=names[i], reason=message_of(error))) from error
+    return connections
 
 
 def prepare_surface(
     mesh: TriangleMesh, min_vertices: int = 0, connection: Connection | None = None, pieces: Pieces = "joined"
 ) -> Surface:
-    """Weld a mesh along its seams, repair it, refine it, flat, to `min_vertices` vertices at least, and tie its parts.
+    """Weld a mesh along its seams, repair it, refine it to at least `min_vertices` vertices, and tie its islands.
+
+    Refinement adds vertices on edges and so does not change the shape.
 
     Parameters
     ----------
     mesh : TriangleMesh
-        The mesh as it came.
     min_vertices : int
-        Edges are halved until all are as short as those of so many evenly spread vertices; 0 leaves them as they are.
+        Edges are halved until none is longer than with this number of evenly spread vertices; 0: no refinement.
     connection : Connection, optional
-        What `connect` gave for all poses of the mesh, so that it is one surface in all of them.
+        Result of `connect` for all poses of the mesh, so that the surface is the same in all of them.
     pieces : "joined" or "separate"
-        For a mesh that comes alone.
+        Whether islands are tied together, if no `connection` is given.
 
     Raises
     ------
@@ -187,46 +199,47 @@ def prepare_surface(
         vertex_of[outside] = cKDTree(vertices).query(mesh.vertices[outside])[1]
 
     surface = TriangleMesh(without_spikes(vertices, faces), faces)
-    middles, caps = small_holes(surface)
-    vertices, faces = np.concatenate([surface.vertices, middles]), np.concatenate([faces, caps])
+    cap_vertices, caps = small_holes(surface)
+    vertices, faces = np.concatenate([surface.vertices, cap_vertices]), np.concatenate([faces, caps])
     face_of = np.append(face_of, np.full(len(caps), -1))
     if min_vertices:
-        longest = EDGE * np.sqrt(surface.area / min_vertices)
-        vertices, faces, piece_of = split_long_edges(vertices, faces, longest, len(vertices) + MOST_NEW * min_vertices)
-        face_of = face_of[piece_of]
-    # Caps and refinement leave the old vertices where they were in the list.
+        longest = LONGEST_EDGE * np.sqrt(surface.area / min_vertices)
+        most_vertices = len(vertices) + MOST_NEW_VERTICES * min_vertices
+        vertices, faces, parent = split_long_edges(vertices, faces, longest, most_vertices)
+        face_of = face_of[parent]
+    # Caps and refinement append vertices, so the numbers in the ties stay valid.
     links = compact[connection.ties]
     if len(vertices) > surface.n_vertices or len(links):
         surface = TriangleMesh(vertices, faces, links)
     return Surface(mesh, surface, vertex_of, face_of, welded_faces)
 
 
-def _in_large_pieces(mesh: TriangleMesh, faces: IntArray, pieces: Pieces) -> BoolArray:
-    """(m',) whether each face belongs to a loose part that is large enough for the operator."""
-    piece = components_of(faces, mesh.n_vertices)[faces[:, 0]]
-    if (piece == piece[0]).all():
+def _in_large_islands(mesh: TriangleMesh, faces: IntArray, pieces: Pieces) -> BoolArray:
+    """(m',) whether each face belongs to an island that is large enough for the surface."""
+    island = islands_of_vertices(faces, mesh.n_vertices)[faces[:, 0]]
+    if (island == island[0]).all():
         return np.ones(len(faces), dtype=bool)
     corners = mesh.vertices[faces]
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    size = np.bincount(piece, weights=areas)
+    size = np.bincount(island, weights=areas)
     largest_first = np.argsort(-size, kind="stable")
-    large = np.zeros(len(size), dtype=bool)
-    large[largest_first[: MOST_PIECES[pieces]]] = True
-    worth_it = size >= LEAST_PIECE[pieces] * size.sum()
-    return (large & worth_it if worth_it.any() else large)[piece]
+    among_largest = np.zeros(len(size), dtype=bool)
+    among_largest[largest_first[: MOST_ISLANDS[pieces]]] = True
+    large = size >= LEAST_ISLAND_SHARE[pieces] * size.sum()
+    return (among_largest & large if large.any() else among_largest)[island]
 
 
 def indicator(owner: IntArray, n_owners: int) -> csr_matrix:
-    """(n_owners, len(owner)) sparse matrix that sums what belongs to each owner; -1: to none."""
+    """(n_owners, k) sparse matrix that sums k values by their owner, given the owner of each (-1: none)."""
     owned = np.flatnonzero(owner >= 0)
     return csr_matrix((np.ones(len(owned)), (owner[owned], owned)), shape=(n_owners, len(owner)))
 
 
 def weld(*poses: TriangleMesh) -> IntArray:
-    """(n,) for each vertex, the lowest-numbered vertex that it is joined with: at the same position in all poses.
+    """(n,) lowest vertex that each vertex is welded with: both are at the same position in all poses.
 
-    Joined are vertices on open borders and the ends of edges without length. Not others: a seam always opens a border,
-    while closed lips or a hand that rests on the hip touch without being one surface, and do so in some poses only.
+    Only vertices on open borders and the ends of edges without length are welded: a seam always has an open border,
+    while closed lips, or a hand that rests on the hip, touch without being one surface, and only in some poses.
     """
     groups = np.stack([_same_position(mesh) for mesh in poses])
     group = np.unique(groups, axis=1, return_inverse=True)[1].ravel() if len(poses) > 1 else groups[0]
@@ -236,21 +249,19 @@ def weld(*poses: TriangleMesh) -> IntArray:
 
 
 def _same_position(mesh: TriangleMesh) -> IntArray:
-    """(n,) number of the group of joined vertices that each vertex is in."""
+    """(n,) group of each vertex: the vertices that would be welded if this pose were the only one."""
     edges, _, count = unique_edges(mesh.faces)
     length = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
     used = np.zeros(mesh.n_vertices, dtype=bool)
     used[edges] = True
     diagonal = float(np.linalg.norm(np.ptp(mesh.vertices[used], axis=0)))
-    tolerance = min(WELD_TOLERANCE * diagonal, WELD_SHARE * float(np.median(length)))
-    joined = [edges[length <= tolerance]]
+    tolerance = min(WELD_TOLERANCE * diagonal, WELD_EDGE_SHARE * float(np.median(length)))
+    pairs = [edges[length <= tolerance]]
     border = np.unique(edges[count == 1])
     if border.size:
-        # Exactly equal ones first: a soup of triangles has many, and the search for near ones would list every pair.
+        # Equal positions first: a triangle soup has many, and the search for near positions would list every pair.
         positions, first, same = np.unique(mesh.vertices[border], axis=0, return_index=True, return_inverse=True)
-        joined.append(np.stack([border, border[first[same.ravel()]]], axis=1))
+        pairs.append(np.stack([border, border[first[same.ravel()]]], axis=1))
         near = cKDTree(positions).query_pairs(tolerance, output_type="ndarray")
-        joined.append(border[first[near]])
-    a, b = np.concatenate(joined).T
-    graph = coo_matrix((np.ones(len(a), dtype=np.int8), (a, b)), shape=(mesh.n_vertices,) * 2)
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+        pairs.append(border[first[near]])
+    return components_of_pairs(np.concatenate(pairs), mesh.n_vertices)

@@ -1,4 +1,4 @@
-"""A triangle mesh that was checked once, so that everything behind it can trust it."""
+"""Triangle mesh that is checked once when it is made, and helpers for arrays of faces, edges and pairs."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
+
+from ..message import Message
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -26,18 +28,18 @@ class TriangleMesh:
     faces : (m, 3) array of int
         Vertex indices of each triangle, in either orientation.
     links : (l, 2) array of int, optional
-        Pairs of vertices that are tied to each other as if they were neighbors, where loose parts meet.
+        Pairs of vertices that count as neighbors without an edge: they tie islands together.
     lengths : (m, 3) array of float, optional
-        Lengths of the edges ab, bc and ca of each triangle, where they are not straight lines between its corners (see
-        `delaunay`). A face may name a vertex twice then.
+        Lengths of the edges ab, bc and ca of each triangle, if they are not the distances between its corners (see
+        `delaunay`). A face may then use a vertex twice.
     layers : int
-        How often the faces cover the surface: each counts for that part of its area.
+        Number of times that the faces cover the surface; each face counts with its area divided by this number.
 
     Raises
     ------
     ValueError
-        If an array has the wrong shape, a coordinate is not finite, an index points nowhere, a face uses a vertex
-        twice, there is no face, or the whole surface has no area. The message says which one and where.
+        If an array has the wrong shape, a coordinate is not finite, an index is out of range, a face uses a vertex
+        twice, there is no face, or the surface has no area. The message names the first such vertex or face.
     """
 
     def __init__(
@@ -60,7 +62,7 @@ class TriangleMesh:
         self.links.setflags(write=False)
 
     def with_unit_area(self, place: IntArray | None = None) -> TriangleMesh:
-        """The same mesh scaled to area 1; each vertex at its (n,) `place` in the list, if given."""
+        """Mesh scaled to area 1, its vertices reordered so that vertex i becomes vertex `place[i]`, if given."""
         scale = 1 / np.sqrt(self.area)
         lengths = None if self._lengths is None else self._lengths * scale
         vertices, faces, links = self.vertices * scale, self.faces, self.links
@@ -71,13 +73,13 @@ class TriangleMesh:
         return TriangleMesh(vertices, faces, links, lengths, self.layers)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """All that the mesh is; see `of_arrays`."""
+        """Arrays from which `of_arrays` makes the same mesh again."""
         arrays = {"vertices": self.vertices, "faces": self.faces, "links": self.links, "layers": np.array(self.layers)}
         return arrays if self._lengths is None else {**arrays, "lengths": self._lengths}
 
     @classmethod
     def of_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> TriangleMesh:
-        """From what `arrays` gave; KeyError or ValueError if it is not that."""
+        """Mesh from the result of `arrays`; raises KeyError or ValueError for anything else."""
         return cls(arrays["vertices"], arrays["faces"], arrays["links"], arrays.get("lengths"), int(arrays["layers"]))
 
     @property
@@ -111,15 +113,27 @@ class TriangleMesh:
         return float(self.face_areas.sum())
 
     @cached_property
+    def face_centers(self) -> FloatArray:
+        """(m, 3) center of each triangle: the mean of its corners."""
+        centers: FloatArray = self.vertices[self.faces].mean(axis=1)
+        centers.setflags(write=False)
+        return centers
+
+    @property
+    def unit_face_centers(self) -> FloatArray:
+        """(m, 3) center of each triangle, in units of the square root of the area."""
+        return np.asarray(self.face_centers / np.sqrt(self.area))
+
+    @cached_property
     def vertex_areas(self) -> FloatArray:
-        """(n,) a third of the area of the triangles around each vertex (barycentric lumping)."""
+        """(n,) area of each vertex: a third of the triangles around it (barycentric lumping)."""
         thirds = np.repeat(self.face_areas / 3, 3)
         return np.bincount(self.faces.ravel(), weights=thirds, minlength=self.n_vertices).astype(np.float64)
 
     @cached_property
     def components(self) -> IntArray:
-        """(n,) which part each vertex belongs to, numbered 0, 1, …; a vertex without face or link is one by itself."""
-        return components_of(self.faces, self.n_vertices, self.links)
+        """(n,) island of each vertex, numbered 0, 1, …; links tie islands into one, a vertex without face is one."""
+        return islands_of_vertices(self.faces, self.n_vertices, self.links)
 
     def __repr__(self) -> str:
         return f"TriangleMesh({self.n_vertices} vertices, {self.n_faces} faces)"
@@ -128,12 +142,16 @@ class TriangleMesh:
 def _checked_vertices(vertices: ArrayLike) -> FloatArray:
     array = np.array(vertices, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] != 3:
-        raise ValueError(f"vertices must have the shape (n, 3), not {array.shape}")
+        raise ValueError(Message("vertices must have the shape (n, 3), not {shape}", shape=array.shape))
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if bad.size:
         raise ValueError(
-            f"vertex {bad[0]} has a coordinate that is not finite: {array[bad[0]].tolist()} "
-            f"({bad.size} such vertices in all)"
+            Message(
+                "vertex {vertex} has a coordinate that is not finite: {position} ({count} such vertices in all)",
+                vertex=bad[0],
+                position=array[bad[0]].tolist(),
+                count=bad.size,
+            )
         )
     return array
 
@@ -143,43 +161,67 @@ def _checked_faces(faces: ArrayLike, n_vertices: int, may_repeat: bool) -> IntAr
     if array.size == 0:
         raise ValueError("the mesh has no faces")
     if array.ndim != 2 or array.shape[1] != 3:
-        raise ValueError(f"faces must have the shape (m, 3), not {array.shape}; triangulate the mesh first")
+        raise ValueError(
+            Message("faces must have the shape (m, 3), not {shape}; triangulate the mesh first", shape=array.shape)
+        )
     if not np.issubdtype(array.dtype, np.integer):
-        raise ValueError(f"faces must be integers (indices of vertices), not {array.dtype}")
+        raise ValueError(Message("faces must be integers (indices of vertices), not {type}", type=array.dtype))
     array = array.astype(np.int64)
     bad = np.flatnonzero(((array < 0) | (array >= n_vertices)).any(axis=1))
     if bad.size:
         raise ValueError(
-            f"face {bad[0]} points to a vertex that does not exist: {array[bad[0]].tolist()}, "
-            f"the mesh has {n_vertices} vertices ({bad.size} such faces in all)"
+            Message(
+                "face {face} uses a vertex that does not exist: {corners}, the mesh has {n_vertices} vertices "
+                "({count} such faces in all)",
+                face=bad[0],
+                corners=array[bad[0]].tolist(),
+                n_vertices=n_vertices,
+                count=bad.size,
+            )
         )
     bad = np.flatnonzero(repeats_a_vertex(array))
     if bad.size and not may_repeat:
-        raise ValueError(f"face {bad[0]} uses a vertex twice: {array[bad[0]].tolist()} ({bad.size} such faces in all)")
+        raise ValueError(
+            Message(
+                "face {face} uses a vertex twice: {corners} ({count} such faces in all)",
+                face=bad[0],
+                corners=array[bad[0]].tolist(),
+                count=bad.size,
+            )
+        )
     return array
 
 
 def _checked_links(links: ArrayLike | None, n_vertices: int) -> IntArray:
     array = np.array([] if links is None else links, dtype=np.int64).reshape(-1, 2)
     if ((array < 0) | (array >= n_vertices)).any():
-        raise ValueError(f"a link points to a vertex that does not exist; the mesh has {n_vertices} vertices")
+        raise ValueError(
+            Message("a link uses a vertex that does not exist; the mesh has {n_vertices} vertices", n_vertices=n_vertices)
+        )
     return array
 
 
 def _checked_lengths(lengths: ArrayLike, n_faces: int) -> FloatArray:
     array = np.array(lengths, dtype=np.float64)
     if array.shape != (n_faces, 3) or not np.isfinite(array).all() or (array < 0).any():
-        raise ValueError(f"lengths must be {n_faces} × 3 finite numbers, none of them negative")
+        raise ValueError(
+            Message("lengths must be {n_faces} × 3 finite numbers, none of them negative", n_faces=n_faces)
+        )
     array.setflags(write=False)
     return array
 
 
-def components_of(faces: IntArray, n_vertices: int, links: IntArray | None = None) -> IntArray:
-    """(n,) which part each vertex belongs to, numbered 0, 1, …"""
-    pairs = [faces[:, [0, 1]], faces[:, [1, 2]], *([] if links is None else [links])]
-    a, b = np.concatenate(pairs).T
-    graph = coo_matrix((np.ones(len(a), dtype=np.int8), (a, b)), shape=(n_vertices,) * 2)
+def components_of_pairs(pairs: IntArray, count: int) -> IntArray:
+    """(count,) connected component of each node of a graph with (p, 2) edges, numbered 0, 1, … by the lowest node."""
+    first, second = pairs.T
+    graph = coo_matrix((np.ones(len(pairs), dtype=np.int8), (first, second)), shape=(count, count))
     return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def islands_of_vertices(faces: IntArray, n_vertices: int, links: IntArray | None = None) -> IntArray:
+    """(n,) island of each vertex, numbered 0, 1, …; (l, 2) links tie islands into one."""
+    pairs = [faces[:, [0, 1]], faces[:, [1, 2]], *([] if links is None else [links])]
+    return components_of_pairs(np.concatenate(pairs), n_vertices)
 
 
 def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
@@ -196,20 +238,20 @@ def areas_of_lengths(lengths: FloatArray) -> FloatArray:
 
 
 def edges_of(faces: IntArray) -> IntArray:
-    """(3 m, 2) edges of each triangle in turn, the lower vertex first; an edge of two triangles is there twice."""
+    """(3 m, 2) edges of each triangle in turn, the lower vertex first; an edge of two triangles occurs twice."""
     return np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
 
 
 def unique_edges(faces: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-    """(e, 2) edges of triangles, each once; (3 m,) the one that each of `edges_of` is; (e,) how many faces it has."""
+    """(e, 2) distinct edges of triangles; (3 m,) index of each row of `edges_of` in them; (e,) faces at each edge."""
     edges = edges_of(faces)
     base = int(edges.max()) + 1
-    # One number an edge: sorted ten times as fast as pairs.
+    # One number for each edge: ten times as fast to sort as pairs.
     keys, which, count = np.unique(edges @ np.array([base, 1]), return_inverse=True, return_counts=True)
     return np.stack([keys // base, keys % base], axis=1), which, count
 
 
 def repeats_a_vertex(faces: IntArray) -> BoolArray:
-    """(m,) whether a triangle names one vertex more than once, and so is no triangle."""
+    """(m,) whether a triangle uses a vertex more than once, and so has no area."""
     a, b, c = faces.T
     return np.asarray((a == b) | (b == c) | (c == a))
