@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from wks_segment.core import TriangleMesh
-from wks_segment.core.mesh.subdivision import cut
+from wks_segment.core.mesh.subdivision import split_faces
 from wks_segment.core.mesh.triangle_mesh import FloatArray, IntArray, unique_edges
 
 Perturbed = tuple[TriangleMesh, IntArray]
@@ -101,8 +101,8 @@ def finer(mesh: TriangleMesh, strength: float, generator: np.random.Generator) -
         middle[split] = len(vertices) + np.arange(split.sum())
         vertices = np.concatenate([vertices, vertices[edges[split]].mean(axis=1)])
         side = np.concatenate([side, side[edges[split]].mean(axis=1)])
-        faces, piece_of = cut(faces, middle[which.reshape(-1, 3)], vertices)
-        owner = owner[piece_of]
+        faces, parent = split_faces(faces, middle[which.reshape(-1, 3)], vertices)
+        owner = owner[parent]
     return TriangleMesh(vertices, faces), owner
 
 

@@ -51,12 +51,21 @@ class Progress:
         """Progress that is reported to a function of the share alone; a `Progress` stays as it is."""
         if report is None or isinstance(report, Progress):
             return report or cls()
-        return cls(lambda stage, share: report(share))
+        return cls(_ShareOnly(report))
 
     def __call__(self, share: float, stage: str | None = None) -> None:
         """Report that a share of this work is done, 0 to 1; raises what the caller's function raises."""
         if self._report is not None:
             self._report(self.stage if stage is None else stage, self._start + share * (self._end - self._start))
+
+    def never_falling(self) -> Progress:
+        """The same progress, except that a lower share than before is reported as the highest one so far.
+
+        For work that may have to start again.
+        """
+        if self._report is None:
+            return self
+        return Progress(_HighestShare(self._report), self.stage, self._start, self._end)
 
     def part(self, start: float, end: float, stage: str | None = None) -> Progress:
         """The part of this work between two shares of it, under the name of another stage if one is given."""
@@ -82,3 +91,24 @@ class Progress:
             yield item, part
             part(1.0)
         self._begun = 1.0
+
+
+class _ShareOnly:
+    """Report to a function of the share alone."""
+
+    def __init__(self, report: Callable[[float], None]) -> None:
+        self._report = report
+
+    def __call__(self, stage: str, share: float) -> None:
+        self._report(share)
+
+
+class _HighestShare:
+    """Report of the highest share so far."""
+
+    def __init__(self, report: Report) -> None:
+        self._report, self._highest = report, 0.0
+
+    def __call__(self, stage: str, share: float) -> None:
+        self._highest = max(self._highest, share)
+        self._report(stage, self._highest)

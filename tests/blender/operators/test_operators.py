@@ -158,7 +158,7 @@ def test_a_fallback_of_the_solver_reaches_the_user(settings, printed, monkeypatc
     def refuse(*arguments):
         raise multilevel.NotConvergedError
 
-    monkeypatch.setattr(eigenpairs, "hierarchical_eigenpairs", refuse)
+    monkeypatch.setattr(eigenpairs, "multilevel_eigenpairs", refuse)
     monkeypatch.setattr(eigenpairs, "DENSE_BELOW", 0)
     select(*limbed_poses(*BENDS))
     printed()

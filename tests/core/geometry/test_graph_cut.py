@@ -5,18 +5,16 @@ import pytest
 from shapes import creature, grid, icosphere, together
 
 from wks_segment.core import TriangleMesh, prepare_surface
-from wks_segment.core.geometry.graph_cut import Energy, crease_weights, cut_borders, expansion, minimized
-from wks_segment.core.mesh.adjacency import FaceAdjacency
+from wks_segment.core.geometry.creases import coarse_curvature
+from wks_segment.core.geometry.graph_cut import CutStyle, Energy, cut_borders, expansion, minimize_energy
+from wks_segment.core.geometry.heat_flow import Flows
+from wks_segment.core.mesh.adjacency import FaceAdjacency, FaceGraph
 
 LENGTH = 0.08
 
 
 def adjacency_of(mesh):
     return FaceAdjacency.of(mesh.faces, mesh.vertices)
-
-
-def centers_of(mesh):
-    return mesh.vertices[mesh.faces].mean(axis=1)
 
 
 def random_energy(random, n, count):
@@ -28,19 +26,19 @@ def random_energy(random, n, count):
 
 def split_at(mesh, x, blur=LENGTH):
     """Posteriors of two labels that meet where the first coordinate is x, as heat flow over a length leaves them."""
-    share = 1 / (1 + np.exp(2 * (centers_of(mesh)[:, 0] - x) / blur))
+    share = 1 / (1 + np.exp(2 * (mesh.face_centers[:, 0] - x) / blur))
     return np.stack([share, 1 - share], axis=1)
 
 
-def cut(mesh, posteriors, weights=None, **others):
-    adjacency = adjacency_of(mesh)
-    weights = np.ones(len(adjacency.pairs)) if weights is None else weights
-    return cut_borders(posteriors, mesh.face_areas, centers_of(mesh), adjacency, weights, LENGTH, **others)
+def cut(mesh, posteriors, weights=None, labels=None, **style):
+    graph = FaceGraph(mesh.face_areas, mesh.face_centers, adjacency_of(mesh))
+    weights = np.ones(len(graph.adjacency.pairs)) if weights is None else weights
+    return cut_borders(posteriors, graph, weights, CutStyle(LENGTH, **style), labels)
 
 
 def at_line(mesh, x):
     """Which pairs of neighbors have the line between them on which the first coordinate is x."""
-    side = centers_of(mesh)[adjacency_of(mesh).pairs, 0] > x
+    side = mesh.face_centers[adjacency_of(mesh).pairs, 0] > x
     return side[:, 0] != side[:, 1]
 
 
@@ -48,7 +46,7 @@ def at_line(mesh, x):
 def test_two_labels_come_out_as_brute_force_finds_them(seed):
     random = np.random.default_rng(seed)
     energy = random_energy(random, 9, 2)
-    found = minimized(energy, random.integers(0, 2, 9), np.ones((9, 2), dtype=bool))
+    found = minimize_energy(energy, random.integers(0, 2, 9), np.ones((9, 2), dtype=bool))
     assert energy.at(found) == min(energy.at(np.array(labels)) for labels in product(range(2), repeat=9))
 
 
@@ -81,11 +79,11 @@ def test_the_energy_never_rises_and_the_result_depends_on_nothing_else(seed):
         moving[takes] = label
         assert energy.at(moving) <= so_far - len(takes[:1])
         so_far = energy.at(moving)
-    found = minimized(energy, labels, allowed)
+    found = minimize_energy(energy, labels, allowed)
     so_far = energy.at(found)
     assert so_far < energy.at(labels)
     assert (allowed[np.arange(300), found] | (found == labels)).all()
-    np.testing.assert_array_equal(minimized(energy, labels, allowed), found)
+    np.testing.assert_array_equal(minimize_energy(energy, labels, allowed), found)
     # Nor can any one label still lower it, those included that were there at first.
     allowed[np.arange(300), labels] = True
     for label in range(6):
@@ -98,7 +96,7 @@ def test_costs_fit_into_what_flows_can_hold_however_large_they_are():
     for size in (0.0, 1e-300, 1e-9, 1e12):
         energy = Energy.of(size * np.array([[0, 1], [1, 0], [0, 3.0]]), pairs, size * np.array([5.0, 0.5]))
         assert energy.data.max() + 2 * energy.borders.sum() < 2**31
-        found = minimized(energy, np.array([0, 1, 1]), np.ones((3, 2), dtype=bool))
+        found = minimize_energy(energy, np.array([0, 1, 1]), np.ones((3, 2), dtype=bool))
         assert found.tolist() == ([0, 1, 1] if size < 1e-200 else [0, 0, 0])
 
 
@@ -106,9 +104,9 @@ def test_a_border_snaps_to_a_marked_edge_within_reach():
     mesh = grid(60, 60)
     near, far = at_line(mesh, 0.55), at_line(mesh, 0.8)
     marked = cut(mesh, split_at(mesh, 0.5), np.where(near | far, 0.1, 1.0))
-    np.testing.assert_array_equal(marked, centers_of(mesh)[:, 0] > 0.55)
+    np.testing.assert_array_equal(marked, mesh.face_centers[:, 0] > 0.55)
     out_of_reach = cut(mesh, split_at(mesh, 0.5), np.where(far, 0.1, 1.0))
-    np.testing.assert_array_equal(out_of_reach, centers_of(mesh)[:, 0] > 0.5)
+    np.testing.assert_array_equal(out_of_reach, mesh.face_centers[:, 0] > 0.5)
 
 
 def test_a_border_snaps_to_a_crease_within_reach():
@@ -117,14 +115,15 @@ def test_a_border_snaps_to_a_crease_within_reach():
     waist = 1 - 0.1 * np.exp(-((x / 0.1) ** 2))
     mesh = TriangleMesh(sphere.vertices * np.stack([np.ones_like(x), waist, waist], axis=1), sphere.faces)
     surface = prepare_surface(mesh)
-    weights = crease_weights(surface, adjacency_of(mesh))
+    curvature = coarse_curvature(surface, adjacency_of(mesh), Flows(surface.mesh))
+    weights = CutStyle(LENGTH).border_weights(curvature)
     across = at_line(mesh, 0.0)
     assert weights[across].max() < 0.6
     assert weights.max() <= 1
     posteriors = split_at(mesh, 0.12, LENGTH * np.sqrt(mesh.area))
     found = cut(mesh, posteriors, weights, strength=2.0)
-    in_crease = np.abs(centers_of(mesh)[:, 0]) < 0.08
-    np.testing.assert_array_equal(found[~in_crease], centers_of(mesh)[~in_crease, 0] > 0)
+    in_crease = np.abs(mesh.face_centers[:, 0]) < 0.08
+    np.testing.assert_array_equal(found[~in_crease], mesh.face_centers[~in_crease, 0] > 0)
     assert (posteriors.argmax(axis=1) != found)[~in_crease].any()
 
 
@@ -133,15 +132,15 @@ def test_what_one_label_took_another_can_take_back():
     data = np.array([(0.0, 9), (1, 1.2), (1, 1.2), (9, 0)])
     energy = Energy.of(data, np.array([(0, 1), (1, 2), (2, 3)]), np.array([0.1, 1.0, 0.5]))
     for start in ([0, 0, 1, 1], [0, 1, 1, 1], [0, 0, 0, 1]):
-        found = minimized(energy, np.array(start), np.ones((4, 2), dtype=bool))
+        found = minimize_energy(energy, np.array(start), np.ones((4, 2), dtype=bool))
         allowed = np.ones((4, 2), dtype=bool)
         allowed[np.arange(4), start] = False
-        np.testing.assert_array_equal(minimized(energy, np.array(start), allowed), found)
+        np.testing.assert_array_equal(minimize_energy(energy, np.array(start), allowed), found)
 
 
 def test_a_jagged_border_becomes_short():
     mesh = grid(60, 60)
-    x, y = centers_of(mesh)[:, :2].T
+    x, y = mesh.face_centers[:, :2].T
     jagged = split_at(mesh, 0.5 + 0.04 * np.sign(np.sin(40 * y)))
     found = cut(mesh, jagged, strength=1.0)
     adjacency = adjacency_of(mesh)
@@ -156,7 +155,7 @@ def test_a_jagged_border_becomes_short():
 def test_nothing_changes_outside_the_band_and_no_label_comes_from_nowhere():
     mesh = grid(50, 50)
     random = np.random.default_rng(0)
-    x = centers_of(mesh)[:, 0]
+    x = mesh.face_centers[:, 0]
     posteriors = np.zeros((mesh.n_faces, 5))
     posteriors[np.arange(mesh.n_faces), np.where(x < 0.3, 0, np.where(x < 0.7, 1, 4))] = 0.2
     # What is almost as likely everywhere, but the likeliest nowhere, must not come up.
@@ -173,7 +172,7 @@ def test_nothing_changes_outside_the_band_and_no_label_comes_from_nowhere():
 
 def test_scale_changes_nothing():
     mesh = creature(0.3, 4)
-    x = centers_of(mesh)[:, 0]
+    x = mesh.face_centers[:, 0]
     posteriors = np.stack([np.exp(-((x - place) ** 2)) for place in (-1, 0, 1, 2)], axis=1)
     posteriors /= posteriors.sum(axis=1, keepdims=True)
     found = cut(mesh, posteriors)
@@ -185,7 +184,7 @@ def test_scale_changes_nothing():
 
 def test_faces_that_take_no_part_stay_so_and_are_no_neighbors():
     mesh = grid(40, 40)
-    before = (centers_of(mesh)[:, 0] > 0.5).astype(int)
+    before = (mesh.face_centers[:, 0] > 0.5).astype(int)
     before[np.random.default_rng(0).random(mesh.n_faces) < 0.1] = -1
     found = cut(mesh, split_at(mesh, 0.55), labels=before, strength=1.0)
     assert (found != before).any()
@@ -209,7 +208,8 @@ def test_a_face_alone_and_polygons_that_share_several_edges():
     pairs = FaceAdjacency(np.array([(0, 1), (1, 0), (1, 2)]), np.ones(3))
     posteriors = np.array([[0.9, 0.1], [0.45, 0.55], [0.1, 0.9]])
     centers = np.array([(0, 0, 0), (1, 0, 0), (2, 0, 0)])
-    found = cut_borders(posteriors, np.ones(3), centers, pairs, np.ones(3), 1.0, strength=0.5)
+    graph = FaceGraph(np.ones(3), centers, pairs)
+    found = cut_borders(posteriors, graph, np.ones(3), CutStyle(1.0, strength=0.5))
     assert found.tolist() == [0, 0, 1]
 
 

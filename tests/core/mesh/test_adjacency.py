@@ -2,15 +2,15 @@ import numpy as np
 from shapes import creature, grid, icosphere, together
 
 from wks_segment.core import TriangleMesh
-from wks_segment.core.mesh.adjacency import FaceAdjacency, connected_regions, merge_crumbs
+from wks_segment.core.mesh.adjacency import FaceAdjacency, FaceGraph, connected_regions, merge_small_regions
 
 
 def adjacency_of(mesh):
     return FaceAdjacency.of(mesh.faces, mesh.vertices)
 
 
-def centers_of(mesh):
-    return mesh.vertices[mesh.faces].mean(axis=1)
+def graph_of(mesh):
+    return FaceGraph(mesh.face_areas, mesh.face_centers, adjacency_of(mesh))
 
 
 def test_neighbors_of_a_closed_surface():
@@ -30,7 +30,7 @@ def test_faces_at_an_edge_of_three_hang_together():
 
 def test_regions_are_connected_and_numbered_by_label():
     mesh = grid(10, 2)
-    labels = (centers_of(mesh)[:, 0] * 5).astype(int) % 2
+    labels = (mesh.face_centers[:, 0] * 5).astype(int) % 2
     regions = connected_regions(labels, adjacency_of(mesh))
     assert regions.max() + 1 == 5
     assert [int(labels[regions == r][0]) for r in range(5)] == [0, 0, 0, 1, 1]
@@ -38,11 +38,11 @@ def test_regions_are_connected_and_numbered_by_label():
 
 def test_crumbs_join_the_neighbor_with_the_longest_border():
     mesh = grid(20, 20)
-    x, y = centers_of(mesh)[:, :2].T
+    x, y = mesh.face_centers[:, :2].T
     labels = (x > 0.5).astype(int)
     crumb = (abs(x - 0.2) < 0.05) & (abs(y - 0.5) < 0.05)
     labels[crumb] = 2
-    cleaned, _ = merge_crumbs(labels, mesh.face_areas, centers_of(mesh), adjacency_of(mesh), 0.05)
+    cleaned, _ = merge_small_regions(labels, graph_of(mesh), 0.05)
     assert set(cleaned) == {0, 1}
     assert (cleaned[crumb] == 0).all()
     np.testing.assert_array_equal(cleaned[~crumb], labels[~crumb])
@@ -50,23 +50,21 @@ def test_crumbs_join_the_neighbor_with_the_longest_border():
 
 def test_a_band_between_two_parts_that_is_small_for_its_label_joins_one_of_them():
     mesh = grid(40, 10)
-    x = centers_of(mesh)[:, 0]
+    x = mesh.face_centers[:, 0]
     labels = np.where(x < 0.4, 0, np.where(x < 0.45, 2, np.where(x < 0.65, 1, 2)))
     band = (labels == 2) & (x < 0.5)
     for least_of_largest, there in ((0.1, {2}), (0.2, {0, 1})):
-        cleaned, _ = merge_crumbs(
-            labels, mesh.face_areas, centers_of(mesh), adjacency_of(mesh), 0.005, least_of_largest
-        )
+        cleaned, _ = merge_small_regions(labels, graph_of(mesh), 0.005, least_of_largest)
         assert set(cleaned[band]) <= there
         np.testing.assert_array_equal(cleaned[~band], labels[~band])
 
 
 def test_two_bands_side_by_side_do_not_keep_each_other():
     mesh = grid(100, 10)
-    x = centers_of(mesh)[:, 0] * 100
+    x = mesh.face_centers[:, 0] * 100
     labels = np.select([x < 30, x < 32, x < 34.5, x < 55, x < 75], [0, 2, 3, 1, 2], 3)
     bands = (x > 30) & (x < 34.5)
-    cleaned, _ = merge_crumbs(labels, mesh.face_areas, centers_of(mesh), adjacency_of(mesh), 0.005, 0.15)
+    cleaned, _ = merge_small_regions(labels, graph_of(mesh), 0.005, 0.15)
     assert set(cleaned[bands]) <= {0, 1}
     np.testing.assert_array_equal(cleaned[~bands], labels[~bands])
 
@@ -74,25 +72,25 @@ def test_two_bands_side_by_side_do_not_keep_each_other():
 def test_after_cleaning_no_part_is_too_small_and_large_ones_keep_their_label():
     mesh = creature(0.2)
     labels = np.random.default_rng(0).integers(0, 5, mesh.n_faces)
-    labels[centers_of(mesh)[:, 0] > 0] = 3
+    labels[mesh.face_centers[:, 0] > 0] = 3
     adjacency = adjacency_of(mesh)
-    cleaned, _ = merge_crumbs(labels, mesh.face_areas, centers_of(mesh), adjacency, 0.005)
+    cleaned, _ = merge_small_regions(labels, graph_of(mesh), 0.005)
     sizes = np.bincount(connected_regions(cleaned, adjacency), weights=mesh.face_areas)
     assert sizes.min() >= 0.005 * mesh.area
-    assert (cleaned[centers_of(mesh)[:, 0] > 0] == 3).all()
+    assert (cleaned[mesh.face_centers[:, 0] > 0] == 3).all()
 
 
 def test_a_small_loose_piece_takes_the_label_of_what_is_next_to_it():
     big, eye = icosphere(3), icosphere(1)
     mesh = together(big, TriangleMesh(0.02 * eye.vertices + (1.03, 0, 0), eye.faces))
-    labels = (centers_of(mesh)[:, 0] > 0).astype(int)
+    labels = (mesh.face_centers[:, 0] > 0).astype(int)
     labels[big.n_faces :] = 7
-    cleaned, _ = merge_crumbs(labels, mesh.face_areas, centers_of(mesh), adjacency_of(mesh), 0.005)
+    cleaned, _ = merge_small_regions(labels, graph_of(mesh), 0.005)
     assert set(cleaned[big.n_faces :]) == {1}
 
 
 def test_a_mesh_of_nothing_but_crumbs_stays_as_it_is():
     pieces = together(*[TriangleMesh(icosphere(1).vertices + 3 * i, icosphere(1).faces) for i in range(4)])
     labels = np.arange(pieces.n_faces) // icosphere(1).n_faces
-    cleaned, _ = merge_crumbs(labels, pieces.face_areas, centers_of(pieces), adjacency_of(pieces), 0.9)
+    cleaned, _ = merge_small_regions(labels, graph_of(pieces), 0.9)
     np.testing.assert_array_equal(cleaned, labels)

@@ -22,8 +22,8 @@ def test_area_of_the_sphere():
     [
         ([(0, 0), (1, 0), (0, 1)], [(0, 1, 2)], r"vertices must have the shape \(n, 3\), not \(3, 2\)"),
         (TRIANGLE, [(0, 1, 2, 0)], r"faces must have the shape \(m, 3\), not \(1, 4\)"),
-        (TRIANGLE, [(0, 1, 3)], r"face 0 points to a vertex that does not exist: \[0, 1, 3\]"),
-        (TRIANGLE, [(0, 1, 2), (0, -1, 2)], r"face 1 points to a vertex that does not exist"),
+        (TRIANGLE, [(0, 1, 3)], r"face 0 uses a vertex that does not exist: \[0, 1, 3\]"),
+        (TRIANGLE, [(0, 1, 2), (0, -1, 2)], r"face 1 uses a vertex that does not exist"),
         (TRIANGLE, [(0, 1, 2), (1, 1, 2)], r"face 1 uses a vertex twice: \[1, 1, 2\]"),
         (TRIANGLE, np.empty((0, 3), int), "no faces"),
         (TRIANGLE, [(0.0, 1.0, 2.0)], "faces must be integers"),

@@ -4,7 +4,8 @@ from scipy.sparse import csr_matrix
 from shapes import creature, grid, icosphere, together
 
 from wks_segment.core import TriangleMesh, stiffness_matrix
-from wks_segment.core.spectral.coarsening import HEAVIEST, Level, _components, cluster, coarse_eigenpairs, edges_of
+from wks_segment.core.mesh.triangle_mesh import components_of_pairs
+from wks_segment.core.spectral.coarsening import HEAVIEST_CELL, Level, cluster_vertices, coarse_eigenpairs, graph_edges
 
 
 def unit_area(mesh):
@@ -12,8 +13,8 @@ def unit_area(mesh):
 
 
 def cells_of(mesh, n_cells):
-    edges = edges_of(csr_matrix(stiffness_matrix(mesh)))
-    return (*cluster(mesh.vertices, edges, mesh.vertex_areas, n_cells), edges)
+    edges = graph_edges(csr_matrix(stiffness_matrix(mesh)))
+    return (*cluster_vertices(mesh.vertices, edges, mesh.vertex_areas, n_cells), edges)
 
 
 @pytest.mark.parametrize("mesh", [icosphere(4), creature(0.4), grid(50, 40)], ids=["sphere", "limbs", "rectangle"])
@@ -22,9 +23,9 @@ def test_cells_are_many_enough_connected_and_not_heavy(mesh):
     cell, count, (a, b) = cells_of(mesh, 200)
     assert 150 < count < 600
     mass = np.bincount(cell, weights=mesh.vertex_areas)
-    assert mass.max() <= HEAVIEST / 200 + mesh.vertex_areas.max()
+    assert mass.max() <= HEAVIEST_CELL / 200 + mesh.vertex_areas.max()
     inside = cell[a] == cell[b]
-    assert _components(a[inside], b[inside], mesh.n_vertices)[1] == count
+    assert components_of_pairs(np.stack([a[inside], b[inside]], axis=1), mesh.n_vertices).max() + 1 == count
 
 
 def test_sheets_that_lie_close_have_cells_of_their_own():

@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import LinAlgError, eigh, solve_triangular
 
 from wks_segment.core.spectral import dense_eigen
-from wks_segment.core.spectral.dense_eigen import COLUMNS, lowest_eigenpairs, solved
+from wks_segment.core.spectral.dense_eigen import SOLVE_COLUMNS, lowest_eigenpairs, solve_lower_triangular
 
 
 def symmetric(n):
@@ -55,6 +55,6 @@ def test_entry_that_is_not_finite_is_refused(bad):
 def test_solutions_in_panels_are_those_at_once(transposed):
     matrix = symmetric(60)
     factor = np.linalg.cholesky(matrix @ matrix.T + 60 * np.eye(60, dtype=np.float32))
-    right = np.random.default_rng(0).standard_normal((60, 2 * COLUMNS + 3)).astype(np.float32)
+    right = np.random.default_rng(0).standard_normal((60, 2 * SOLVE_COLUMNS + 3)).astype(np.float32)
     expected = solve_triangular(factor, right, lower=True, trans=int(transposed))
-    np.testing.assert_allclose(solved(factor, right, transposed), expected, atol=1e-5)
+    np.testing.assert_allclose(solve_lower_triangular(factor, right, transposed), expected, atol=1e-5)

@@ -6,11 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ...core.mesh.triangle_mesh import FloatArray, IntArray
+from ...core.mesh.triangle_mesh import FloatArray, IntArray, components_of_pairs
 from ..scene.attributes import read_floats
 from ..scene.characters import Character
 from ..scene.mesh_arrays import Body
@@ -46,12 +44,11 @@ def _pieces(character: Character, part: int, least_share: float) -> IntArray:
     pair = np.concatenate(pairs)
     inside = pair[(label[pair] == part).all(axis=1)]
     count = len(label)
-    graph = coo_matrix((np.ones(len(inside)), (inside[:, 0], inside[:, 1])), shape=(count, count))
     polygons_in = np.flatnonzero(label == part)
     result = np.full(count, -1)
     if not len(polygons_in):
         return result
-    _, component = np.unique(connected_components(graph, directed=False)[1][polygons_in], return_inverse=True)
+    _, component = np.unique(components_of_pairs(inside, count)[polygons_in], return_inverse=True)
     size = np.bincount(component.ravel(), weights=area[polygons_in])
     order = np.argsort(-size, kind="stable")
     large = order[(size[order] >= least_share * area.sum()) | (np.arange(len(order)) == 0)]

@@ -21,7 +21,7 @@ def transferred(source: Pose, target: Pose) -> IntArray:
     labels = labels_on(source.character.objects[0].data)
     known = source.polygon_of >= 0
     tree = BVHTree.FromPolygons(source.mesh.vertices.tolist(), source.mesh.faces[known].tolist())
-    middles = target.mesh.vertices[target.mesh.faces].mean(axis=1)
+    middles = target.mesh.face_centers
     nearest = np.array([tree.find_nearest(middle)[2] for middle in middles.tolist()])
     assert labels is not None
     found, column = np.unique(labels[source.polygon_of[known][nearest]], return_inverse=True)

@@ -36,7 +36,7 @@ BALLS_AT_ONCE = 2_000
 BORDER_CREASE, MOST_CONCAVE, MOST_CONVEX = 0.4, 15.0, 2.0
 """A border is weighted by `exp(BORDER_CREASE * clip(curvature, -MOST_CONCAVE, MOST_CONVEX))`: less in creases …"""
 BORDER_STEP, MOST_STEP = 0.1, 40.0
-"""… and by `exp(-BORDER_STEP * min(step, MOST_STEP))`, where `step` is the change of log thickness per unit of length."""
+"""… and by `exp(-BORDER_STEP * min(step, MOST_STEP))`, with `step` the change of log thickness per unit of length."""
 LEAST_DISTANCE = 3e-3
 """Least distance between faces for that change: on tiny faces it would be noise."""
 LEAST_THICKNESS = 0.003
@@ -98,9 +98,7 @@ def coarse_curvature(surface: Surface, adjacency: FaceAdjacency, flows: Flows) -
     return curvature_across(surface, smooth_normals(vertex_normals(surface), flows.over(COARSE)), adjacency)
 
 
-def log_thickness(
-    surface: Surface, normals: FloatArray, flows: Flows, progress: Progress | None = None
-) -> FloatArray:
+def log_thickness(surface: Surface, normals: FloatArray, flows: Flows, progress: Progress | None = None) -> FloatArray:
     """(n',) logarithm of the radius of the largest inner ball that touches the surface at each vertex.
 
     In units of the square root of the area. By the shrinking ball of Ma, Bae and Choi (2012), against the tangent

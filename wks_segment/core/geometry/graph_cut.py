@@ -22,7 +22,7 @@ from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 
 CUT_CREASE, CUT_MOST_CONCAVE, CUT_MOST_CONVEX = 0.05, 15.0, 0.0
 """A border is weighted by `exp(CUT_CREASE * clip(curvature, -CUT_MOST_CONCAVE, CUT_MOST_CONVEX))`. A crease weight of
-0.4 agrees best with people, but creases come and go with the pose, so that segments would differ more between poses …"""
+0.4 agrees best with people, but creases come and go with the pose, so that segments would differ between poses …"""
 CUT_STRENGTH = 2.0
 """Cost of a border by its length, in units of the smoothing length. Below, borders stay where noise puts them."""
 CUT_WIDTH = 1.0

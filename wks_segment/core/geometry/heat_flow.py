@@ -16,7 +16,7 @@ from ..spectral.laplacian import stiffness_matrix, unit_area_masses
 from ..spectral.multifrontal import Dissection, NestedDissectionFactor, SingularError, nested_dissection
 
 CELLS_ABOVE = 200_000
-"""Number of vertices above which values are smoothed on cells: time and memory of a factor grow faster than the mesh."""
+"""Number of vertices above which values are smoothed on cells: a factor grows faster than the mesh."""
 CELLS_PER_LENGTH = 2.0
 """Cells in a row along the smoothing length."""
 LEAST_CELLS = 4_000

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix, diags
 
-from ..geometry.graph_cut import CREASE, WIDTH, cut_borders, weights_of_curvature
-from ..mesh.adjacency import FaceAdjacency, merge_crumbs
+from ..geometry.graph_cut import CUT_CREASE, CUT_WIDTH, CutStyle, cut_borders
+from ..mesh.adjacency import FaceAdjacency, FaceGraph, merge_small_regions
 from ..mesh.surface import indicator
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ..poses.pose_cache import Workpiece
@@ -86,8 +86,8 @@ class PosedMesh:
         length: float,
         least_share: float,
         marked: IntArray | None = None,
-        crease: float = CREASE,
-        width: float = WIDTH,
+        crease: float = CUT_CREASE,
+        width: float = CUT_WIDTH,
         least_of_largest: float = 0.0,
     ) -> tuple[IntArray, FaceAdjacency]:
         """Label the polygons, and clean the labels.
@@ -105,7 +105,7 @@ class PosedMesh:
         marked : (q, 2) int array, optional
             Neighboring polygons between which a border is welcome.
         crease, width : float
-            How much creases draw borders, and over how many smoothing lengths; see `crease_weights`, `cut_borders`.
+            How much creases draw borders, and over how many smoothing lengths; see `CutStyle`.
         least_of_largest : float
             Connected parts under this share of the largest one with their label do, too.
 
@@ -115,15 +115,15 @@ class PosedMesh:
         pieces tied to what adopted them.
         """
         labels = np.where(self._times_seen > 0, posteriors.argmax(axis=1), -1)
+        graph = FaceGraph(self.areas, self._centers, self.neighbors)
         if length > 0:
+            style = CutStyle(length, crease, width)
             layout = self._layouts[self._most]
-            weights = weights_of_curvature(poses[self._most].curvature[layout.across], crease)
+            weights = style.border_weights(poses[self._most].curvature[layout.across])
             if marked is not None:
                 weights = np.where(self.neighbors.among(marked), MARKED * weights, weights)
-            labels = cut_borders(
-                posteriors, self.areas, self._centers, self.neighbors, weights, length, labels, width=width
-            )
-        return merge_crumbs(labels, self.areas, self._centers, self.neighbors, least_share, least_of_largest)
+            labels = cut_borders(posteriors, graph, weights, style, labels)
+        return merge_small_regions(labels, graph, least_share, least_of_largest)
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,7 @@ class _Layout:
         total = sum_over @ weight
         seen = np.asarray(total > 0)
         mean = csr_matrix(diags(1 / np.where(seen, total, 1)) @ sum_over @ diags(weight))
-        centers = original.vertices[original.faces].mean(axis=1) / np.sqrt(original.area)
+        centers = original.unit_face_centers
         return cls(
             seen,
             total * seen,

@@ -87,7 +87,7 @@ class Regions:
 
     def centers(self, mesh: TriangleMesh) -> FloatArray:
         """(r, 3) center of each of the r largest in units of the square root of the area; x from the middle."""
-        places = mesh.vertices[mesh.faces].mean(axis=1) / np.sqrt(mesh.area)
+        places = mesh.unit_face_centers
         middle = np.average(places[:, 0], weights=mesh.face_areas)
         count = int(self.region.max()) + 1
         weights = mesh.face_areas + np.finfo(float).tiny
@@ -365,7 +365,7 @@ def sides_of_parts(
     opposite = (label_of[sided][:, None] == label_of[sided]) & (np.outer(mean[sided], mean[sided]) < 0) & alike
     side = np.zeros(count, dtype=np.int64)
     side[sided] = np.sign(mean[sided]) * opposite.any(axis=1)
-    centers = original.vertices[original.faces].mean(axis=1)[seen]
+    centers = original.face_centers[seen]
     for label in np.unique(label_of[~large]):
         ground = np.flatnonzero(large[of_faces] & (label_of[of_faces] == label))
         crumbs = np.flatnonzero(~large[of_faces] & (label_of[of_faces] == label))

@@ -15,11 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import coo_matrix
 
+from ..geometry.agglomeration import gains_of_joining, join_in_table
 from ..geometry.creases import border_weights
-from ..geometry.normalized_cuts import gains_of_joining, parts
-from ..mesh.adjacency import FaceAdjacency, connected_regions, merge_crumbs
+from ..geometry.normalized_cuts import human_like_parts
+from ..mesh.adjacency import FaceAdjacency, FaceGraph, connected_regions, merge_small_regions
 from ..mesh.surface import Surface
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
+from ..progress import Progress
 
 LEAST_SHARE = 0.01
 """Groups under this share of the area are joined first: they would take the place of a part."""
@@ -61,9 +63,9 @@ class Ground:
         """Find the neighbors, weigh their borders and cut; `tick` is called with the share that is done."""
         original = surface.original
         adjacency = FaceAdjacency.of(surface.welded_faces, original.vertices)
-        weights, curvature = border_weights(surface, adjacency, tick)
+        weights, curvature = border_weights(surface, adjacency, Progress.of_share(tick))
         lengths = weights * adjacency.lengths / np.sqrt(original.area)
-        return cls(surface, adjacency, lengths, parts(surface, adjacency, lengths, curvature))
+        return cls(surface, adjacency, lengths, human_like_parts(surface, adjacency, lengths, curvature))
 
     def unlike_parts(self, labels: IntArray) -> float:
         """Rand-index error of the connected regions of (m,) labels against the parts, by area (Rand, 1971).
@@ -104,8 +106,8 @@ class Contacts:
         """Of one pose, given (m, K) smoothed posteriors of its faces."""
         n_components = posteriors.shape[1]
         original, adjacency = ground.surface.original, ground.adjacency
-        centers = original.vertices[original.faces].mean(axis=1)
-        labels, _ = merge_crumbs(posteriors.argmax(axis=1), original.face_areas, centers, adjacency, LEAST_REGION)
+        graph = FaceGraph(original.face_areas, original.face_centers, adjacency)
+        labels, _ = merge_small_regions(posteriors.argmax(axis=1), graph, LEAST_REGION)
         shares = original.face_areas / original.area
         a, b = labels[adjacency.pairs].T
         borders, areas = np.zeros((n_components, n_components)), np.zeros(n_components)
@@ -185,9 +187,7 @@ class Grouping:
             pairs[step] = name[larger], name[smaller]
             name[i] = name[larger]
             for table in (borders, overlaps):
-                table[i] += table[j]
-                table[:, i] += table[:, j]
-                table[j] = table[:, j] = 0
+                join_in_table(table, i, j)
             areas[i] += areas[j]
             scattered[i] &= scattered[j]
             scattered[j] = alive[j] = False

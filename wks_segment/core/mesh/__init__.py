@@ -1,1 +1,1 @@
-"""Triangle meshes: arrays, neighbors, repair, subdivision, islands, and the surface on which eigenpairs are computed."""
+"""Triangle meshes: neighbors, repair, subdivision, islands, and the surface on which eigenpairs are computed."""

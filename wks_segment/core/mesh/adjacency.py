@@ -112,7 +112,7 @@ def merge_small_regions(
     adjacency = graph.adjacency
     region = connected_regions(labels, adjacency)
     count = region.max() + 1
-    size = np.bincount(region, weights=graph.areas, minlength=count)
+    size: FloatArray = np.bincount(region, weights=graph.areas, minlength=count).astype(np.float64)
     label_of = np.zeros(count, dtype=np.int64)
     label_of[region] = labels
     least = min_share * graph.areas.sum()
@@ -135,9 +135,7 @@ def merge_small_regions(
     )
 
 
-def _merge_targets(
-    size: FloatArray, minor: BoolArray, least: float, borders: dict[int, dict[int, float]]
-) -> IntArray:
+def _merge_targets(size: FloatArray, minor: BoolArray, least: float, borders: dict[int, dict[int, float]]) -> IntArray:
     """(r,) region that each of r regions ends up in, merging small ones in order of size; updates `size` in place.
 
     `minor` regions are merged whatever their size is, others below `least`.

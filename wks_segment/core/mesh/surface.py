@@ -149,7 +149,7 @@ def connect(*poses: TriangleMesh, rest: TriangleMesh | None = None, pieces: Piec
 
 
 def connect_alike(meshes: Sequence[TriangleMesh], names: Sequence[str], pieces: Pieces = "joined") -> list[Connection]:
-    """`connect` for several meshes: those with the same faces are poses of one mesh. Errors begin with a mesh's name."""
+    """`connect` for several meshes; those with the same faces are poses of one mesh. Errors begin with a name."""
     connections: list[Connection] = []
     firsts = [next(j for j, other in enumerate(meshes) if np.array_equal(mesh.faces, other.faces)) for mesh in meshes]
     for i, first in enumerate(firsts):

@@ -196,7 +196,9 @@ def _checked_links(links: ArrayLike | None, n_vertices: int) -> IntArray:
     array = np.array([] if links is None else links, dtype=np.int64).reshape(-1, 2)
     if ((array < 0) | (array >= n_vertices)).any():
         raise ValueError(
-            Message("a link uses a vertex that does not exist; the mesh has {n_vertices} vertices", n_vertices=n_vertices)
+            Message(
+                "a link uses a vertex that does not exist; the mesh has {n_vertices} vertices", n_vertices=n_vertices
+            )
         )
     return array
 

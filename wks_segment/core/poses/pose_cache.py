@@ -8,8 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..geometry.creases import outward
-from ..geometry.graph_cut import coarse_curvature
+from ..geometry.creases import coarse_curvature, outward
 from ..geometry.heat_flow import Flows
 from ..mesh.adjacency import FaceAdjacency
 from ..mesh.surface import Surface

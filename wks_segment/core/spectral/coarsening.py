@@ -1,7 +1,7 @@
-"""A coarse space for smooth functions on a surface: cells of vertices, and local linear functions over them.
+"""Coarse space of smooth functions on a surface: cells of vertices, and locally linear functions over the cells.
 
-The low eigenfunctions vary slowly, so that a few values a wavelength tell them apart. The space need not be accurate,
-only rich enough; inverse iteration on the surface itself does the rest (`spectrum`).
+The low eigenfunctions vary slowly, so that a few values per wavelength describe them. The space need not be accurate,
+only rich enough; inverse iteration on the surface does the rest (`multilevel`).
 """
 
 from __future__ import annotations
@@ -11,47 +11,46 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky
 from scipy.sparse import coo_matrix, csr_matrix, diags, identity, vstack
-from scipy.sparse.csgraph import connected_components
 
-from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
-from .dense_eigen import lowest_eigenpairs, solved
+from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh, components_of_pairs
+from .dense_eigen import lowest_eigenpairs, solve_lower_triangular
 from .laplacian import stiffness_matrix, unit_area_masses
 
-HEAVIEST = 1.5
-"""A cell of more than this many times the mean mass is split: on a thin limb, a cube of space holds a whole tube."""
-LIGHTEST = 0.2
-"""A cell of less than this many times the mean mass joins a neighbor, if it does not become too heavy."""
-SPLITS = 5
-"""Rounds of splitting, each into half the size."""
-REACH, REACH_SMOOTHED, REACH_WIDE = 2.0, 1.8, 2.6
-"""Radius of a cell's function, in square roots of a cell's mean area: plain, smoothed, and for a space that is solved
-densely. Wider functions are more accurate and overlap more."""
-MANY_VERTICES = 15
-"""Vertices in a cell from which on functions need no smoothing: they are smooth on the scale of the triangles."""
-DAMPING = np.float32(0.66)
-"""Of a step of smoothing, in units of the inverse diagonal."""
-LEAST_WEIGHT = 1e-3
-"""Weight of a vertex's own cell if even its middle is out of reach."""
+HEAVIEST_CELL = 1.5
+"""Mass of a cell, in units of the mean, above which it is split: on a thin limb, a cube holds a whole tube."""
+LIGHTEST_CELL = 0.2
+"""Mass of a cell, in units of the mean, below which it joins a neighbor, unless that becomes too heavy."""
+MAX_SPLITS = 5
+"""Most rounds of splitting, each into cubes of half the size."""
+REACH_PLAIN, REACH_SMOOTHED, REACH_WIDE = 2.0, 1.8, 2.6
+"""Radius of the function of a cell, in units of the square root of a cell's mean area: plain, smoothed, and for a space
+that is solved densely. Wider functions are more accurate and overlap more."""
+MANY_PER_CELL = 15
+"""Vertices per cell from which functions need no smoothing: they are smooth on the scale of the triangles."""
+SMOOTHING_DAMPING = np.float32(0.66)
+"""Length of a smoothing step, in units of the inverse diagonal."""
+LEAST_OWN_WEIGHT = 1e-3
+"""Least weight of a vertex's own cell, for a vertex that its function does not reach."""
 RIDGE = 1e-3
-"""Decides what neighbors do not: across a flat surface, or where there are too few, a fit is constant."""
-ROWS = 15_000
-"""Vertices whose functions are fitted at once: their moments stay in the cache."""
+"""Regularization of a fit, relative to its weights: in directions in which its cells do not extend, it is constant."""
+FIT_ROWS = 15_000
+"""Vertices whose functions are fitted at once, so that their moments fit the cache."""
 
 
-def edges_of(matrix: csr_matrix) -> tuple[IntArray, IntArray]:
+def graph_edges(matrix: csr_matrix) -> tuple[IntArray, IntArray]:
     """The two ends of each edge in the graph of a symmetric sparse matrix."""
     entries = matrix.tocoo()
     once = entries.row < entries.col
     return entries.row[once], entries.col[once]
 
 
-def cluster(
+def cluster_vertices(
     positions: FloatArray, edges: tuple[IntArray, IntArray], masses: FloatArray, n_cells: int
 ) -> tuple[IntArray, int]:
-    """(n,) cell of each vertex, and how many there are: about `n_cells`, connected, none of them much too heavy.
+    """(n,) cell of each vertex, and their number: about `n_cells` connected cells, none of them much too heavy.
 
-    Cubes of space, cut where the surface is not connected within them; those that still hold too much of it are cut
-    again at half the size.
+    Cells are the connected parts of the surface within cubes of space; cells that are too heavy are split again by
+    cubes of half the size.
     """
     first, second = edges
     mean = masses.sum() / n_cells
@@ -59,7 +58,7 @@ def cluster(
     cell = np.zeros(len(positions), dtype=np.int64)
     too_heavy = np.ones(len(positions), dtype=bool)
     corner = positions.min(axis=0)
-    for _ in range(SPLITS):
+    for _ in range(MAX_SPLITS):
         cube = np.floor((positions - corner) / size).astype(np.int64)
         cube -= cube.min(axis=0)
         spans = cube.max(axis=0) + 1
@@ -67,9 +66,10 @@ def cluster(
         together = (cell[first] == cell[second]) & (
             (number[first] == number[second]) | ~(too_heavy[first] & too_heavy[second])
         )
-        cell, count = _components(first[together], second[together], len(positions))
+        cell = components_of_pairs(np.stack([first[together], second[together]], axis=1), len(positions))
+        count = int(cell.max()) + 1
         mass = _sums(masses, cell, count)
-        too_heavy = mass[cell] > HEAVIEST * mean
+        too_heavy = mass[cell] > HEAVIEST_CELL * mean
         if not too_heavy.any():
             break
         size /= 2
@@ -77,23 +77,18 @@ def cluster(
 
 
 def _sums(values: FloatArray, owner: IntArray, count: int) -> FloatArray:
-    """(count,) sum of the values that belong to each owner."""
+    """(count,) sums of values by owner."""
     return np.bincount(owner, weights=values, minlength=count).astype(np.float64)
-
-
-def _components(first: IntArray, second: IntArray, n: int) -> tuple[IntArray, int]:
-    graph = coo_matrix((np.ones(len(first), dtype=np.int8), (first, second)), shape=(n, n))
-    count, label = connected_components(graph, directed=False)
-    return label.astype(np.int64), int(count)
 
 
 def _join_light_cells(
     cell: IntArray, edges: tuple[IntArray, IntArray], mass: FloatArray, mean: float
 ) -> tuple[IntArray, int]:
-    """Let light cells join the neighbor with which they share most edges."""
+    """(n,) cell of each vertex, after light cells have joined the neighbor with which they share most edges."""
     a, b = cell[edges[0]], cell[edges[1]]
     a, b = np.concatenate([a, b]), np.concatenate([b, a])
-    fits = (mass[a] < LIGHTEST * mean) & (mass[b] >= LIGHTEST * mean) & (mass[a] + mass[b] < HEAVIEST * mean) & (a != b)
+    light = mass < LIGHTEST_CELL * mean
+    fits = light[a] & ~light[b] & (mass[a] + mass[b] < HEAVIEST_CELL * mean) & (a != b)
     shared = coo_matrix((np.ones(fits.sum()), (a[fits], b[fits])), shape=(len(mass),) * 2).tocsr()
     target = np.arange(len(mass))
     joins = np.diff(shared.indptr) > 0
@@ -104,9 +99,19 @@ def _join_light_cells(
 
 
 def coarse_eigenpairs(level: Level, n_zero: int, count: int) -> tuple[FloatArray, FloatArray]:
-    """The lowest non-zero eigenpairs of a level that is small enough to be solved densely, at most `count`.
+    """The lowest non-zero eigenpairs, at most `count`, of a level that is small enough to be solved densely.
 
-    Returns (k,) values and an (n, k) array of vectors in float32; the first `n_zero` pairs are left out.
+    Parameters
+    ----------
+    level : Level
+        With n cells.
+    n_zero : int
+        Number of zero modes, which are left out.
+    count : int
+
+    Returns
+    -------
+    (k,) values, rising, and (n, k) vectors in float32.
 
     Raises
     ------
@@ -118,24 +123,24 @@ def coarse_eigenpairs(level: Level, n_zero: int, count: int) -> tuple[FloatArray
     mass = level.mass.toarray()
     mass[np.diag_indices_from(mass)] *= 1 + np.finfo(np.float32).eps
     factor = cholesky(mass, lower=True)
-    reduced = solved(factor, solved(factor, level.stiffness.toarray()).T)
+    reduced = solve_lower_triangular(factor, solve_lower_triangular(factor, level.stiffness.toarray()).T)
     values, weights = lowest_eigenpairs((reduced + reduced.T) / 2, n_zero + count)
-    vectors = solved(factor, weights[:, n_zero:], transposed=True)
+    vectors = solve_lower_triangular(factor, weights[:, n_zero:], transposed=True)
     return values[n_zero:].astype(np.float64), np.ascontiguousarray(vectors)
 
 
 @dataclass(frozen=True)
 class Level:
-    """The eigenproblem S x = λ M x on a surface, or restricted to the functions of its cells.
+    """The eigenproblem S x = λ M x on a surface of area 1, or restricted to the functions of its cells.
 
     Attributes
     ----------
     positions : (n, 3) array
-        Of the vertices, or the vertices that stand for the cells, of a surface of area 1.
+        Positions of the vertices, or of the vertex in the middle of each cell.
     edges : two (e,) int arrays
-        The ends of what is adjacent.
+        The ends of the edges between vertices, or between neighboring cells.
     areas : (n,) array
-        Area that belongs to each.
+        Area of each vertex or cell.
     stiffness, mass : (n, n) sparse matrices of float32
     """
 
@@ -151,64 +156,65 @@ class Level:
         stiffness = csr_matrix(stiffness_matrix(mesh)).astype(np.float32)
         stiffness.sort_indices()
         masses = unit_area_masses(mesh)
-        return cls(mesh.vertices, edges_of(stiffness), masses, stiffness, csr_matrix(diags(masses.astype(np.float32))))
+        mass = csr_matrix(diags(masses.astype(np.float32)))
+        return cls(mesh.vertices, graph_edges(stiffness), masses, stiffness, mass)
 
     def zero_modes(self) -> FloatArray:
-        """(n, c) M-orthonormal constants in float32, one for each component."""
-        component, count = _components(*self.edges, len(self.areas))
-        modes = np.zeros((len(component), count), dtype=np.float32)
-        modes[np.arange(len(component)), component] = 1
+        """(n, c) M-orthonormal constants in float32, one for each of c islands."""
+        island = components_of_pairs(np.stack(self.edges, axis=1), len(self.areas))
+        modes = np.zeros((len(island), int(island.max()) + 1), dtype=np.float32)
+        modes[np.arange(len(island)), island] = 1
         return np.asarray(
             modes / np.sqrt(np.einsum("ij,ij->j", modes, self.mass @ modes, dtype=np.float64)), np.float32
         )
 
     def coarsened(self, n_cells: int, wide: bool = False) -> tuple[csr_matrix, Level]:
-        """Prolongation to this level from one of about `n_cells` cells, and that level (Galerkin's restriction).
+        """Prolongation from a level of about `n_cells` cells to this one, and that level (Galerkin's restriction).
 
-        The prolongation is an (n, number of cells) sparse matrix: from values at cells to smooth functions. `wide` ones
-        suit a space that is solved densely.
+        The prolongation is an (n, number of cells) sparse matrix that makes smooth functions from values at cells;
+        `wide` functions suit a space that is solved densely.
         """
-        smoothed = wide or len(self.areas) < MANY_VERTICES * n_cells
-        reach = REACH_WIDE if wide else REACH_SMOOTHED if smoothed else REACH
-        cell, count = cluster(self.positions, self.edges, self.areas, n_cells)
+        smoothed = wide or len(self.areas) < MANY_PER_CELL * n_cells
+        reach = REACH_WIDE if wide else REACH_SMOOTHED if smoothed else REACH_PLAIN
+        cell, count = cluster_vertices(self.positions, self.edges, self.areas, n_cells)
         middle = _middle_vertices(self.positions, self.areas, cell, count)
         adjacent = _adjacency(cell, count, self.edges)
         around = csr_matrix(adjacent @ adjacent)
         blocks = [
             _moving_least_squares(
-                self.positions[start : start + ROWS],
-                cell[start : start + ROWS],
+                self.positions[start : start + FIT_ROWS],
+                cell[start : start + FIT_ROWS],
                 self.positions[middle],
                 around,
                 reach / np.sqrt(n_cells),
             )
-            for start in range(0, len(cell), ROWS)
+            for start in range(0, len(cell), FIT_ROWS)
         ]
         prolongation = csr_matrix(vstack(blocks, format="csr"))
         if smoothed:
             inverse_diagonal = 1 / np.maximum(self.stiffness.diagonal(), np.finfo(np.float32).tiny)
             prolongation = csr_matrix(
-                prolongation - diags(DAMPING * inverse_diagonal) @ (self.stiffness @ prolongation)
+                prolongation - diags(SMOOTHING_DAMPING * inverse_diagonal) @ (self.stiffness @ prolongation)
             )
         restricted = [csr_matrix(prolongation.T @ (full @ prolongation)) for full in (self.stiffness, self.mass)]
         return prolongation, Level(
-            self.positions[middle], edges_of(adjacent), _sums(self.areas, cell, count), *restricted
+            self.positions[middle], graph_edges(adjacent), _sums(self.areas, cell, count), *restricted
         )
 
 
 def _moving_least_squares(
     positions: FloatArray, cell: IntArray, middles: FloatArray, around: csr_matrix, reach: float
 ) -> csr_matrix:
-    """(len(positions), len(middles)) weights that carry values at the middles of cells to positions on the surface.
+    """(len(positions), len(middles)) sparse weights that interpolate values at the middles of cells at positions.
 
-    Moving least squares (Lancaster and Salkauskas, 1981) over the cells `around` a position's own, with Wendland's
-    weights: they sum to 1 and carry over functions that are linear in space.
+    Moving least squares (Lancaster and Salkauskas, 1981) over the cells `around` the cell of a position, with
+    Wendland's weights: they sum to 1 and reproduce functions that are linear in space.
     """
-    row, column = _pairs(cell, around)
+    row, column = _vertex_cell_pairs(cell, around)
     across = (middles[column] - positions[row]) / reach
     distance = np.sqrt(np.einsum("ij,ij->i", across, across))
     weight = np.where(distance < 1, (1 - distance) ** 4 * (4 * distance + 1), 0.0)
-    weight = np.where(column == cell[row], np.maximum(weight, LEAST_WEIGHT), weight)
+    weight = np.where(column == cell[row], np.maximum(weight, LEAST_OWN_WEIGHT), weight)
     near = weight > 0
     row, column, weight = row[near], column[near], weight[near]
     x, y, z = across[near].T
@@ -217,7 +223,7 @@ def _moving_least_squares(
     def moment(values: FloatArray) -> FloatArray:
         return np.asarray(np.add.reduceat(values, first[:-1]))
 
-    # The constant term of the weighted fit of 1, x, y, z: the inverse of the 3 × 3 second moments by its adjugate.
+    # Constant term of the weighted fit of 1, x, y, z; the 3 × 3 second moments are inverted by the adjugate.
     wx, wy, wz = weight * x, weight * y, weight * z
     w, mx, my, mz = moment(weight), moment(wx), moment(wy), moment(wz)
     ridge = RIDGE * w
@@ -235,7 +241,7 @@ def _moving_least_squares(
 
 
 def _middle_vertices(positions: FloatArray, masses: FloatArray, cell: IntArray, count: int) -> IntArray:
-    """(count,) the vertex of each cell that is nearest to its center of mass."""
+    """(count,) vertex of each cell that is nearest to its center of mass."""
     mass = _sums(masses, cell, count)
     center = np.stack([_sums(masses * x, cell, count) for x in positions.T], axis=1)
     away = ((positions - (center / mass[:, None])[cell]) ** 2).sum(axis=1)
@@ -244,14 +250,14 @@ def _middle_vertices(positions: FloatArray, masses: FloatArray, cell: IntArray, 
 
 
 def _adjacency(cell: IntArray, count: int, edges: tuple[IntArray, IntArray]) -> csr_matrix:
-    """(count, count) matrix with an entry for each cell itself and for each that touches it."""
+    """(count, count) matrix with an entry for each cell and itself, and for each pair of neighboring cells."""
     a, b = cell[edges[0]], cell[edges[1]]
     touch = csr_matrix((np.ones(len(a), dtype=np.int32), (a, b)), shape=(count, count))
     return csr_matrix(csr_matrix(touch + touch.T + identity(count, dtype=np.int32, format="csr")) != 0)
 
 
-def _pairs(cell: IntArray, adjacent: csr_matrix) -> tuple[IntArray, IntArray]:
-    """Pairs of a vertex and a cell: its own, and those that touch its own."""
+def _vertex_cell_pairs(cell: IntArray, adjacent: csr_matrix) -> tuple[IntArray, IntArray]:
+    """Pairs of a vertex and a cell: its own cell, and those adjacent to it."""
     size = np.diff(adjacent.indptr)[cell]
     start = np.repeat(adjacent.indptr[cell] - np.concatenate([[0], np.cumsum(size)[:-1]]), size)
     return np.repeat(np.arange(len(cell)), size), adjacent.indices[start + np.arange(size.sum())]

@@ -1,7 +1,7 @@
 """The Laplace–Beltrami operator by linear finite elements: stiffness and mass matrix.
 
-Pinkall and Polthier, "Computing discrete minimal surfaces and their conjugates" (1993). A border needs nothing extra:
-the finite elements' natural condition there is Neumann's.
+Pinkall and Polthier, "Computing discrete minimal surfaces and their conjugates" (1993). Borders need no extra code: the
+natural boundary condition of finite elements is Neumann's.
 """
 
 from __future__ import annotations
@@ -12,23 +12,23 @@ from scipy.sparse import csc_matrix, csr_matrix, diags
 from ..mesh.triangle_mesh import FloatArray, TriangleMesh
 
 MIN_DOUBLE_AREA = 1e-4
-"""Least double area of a triangle in the cotangents, as a fraction of its longest edge squared: a thinner one glues its
-corners together no more than that, which is enough, and leaves single precision its digits."""
-LINK = 1.0
-"""Weight of a link: about that of an edge between two equilateral triangles, 0.58."""
+"""Least double area of a triangle in the cotangents, as a fraction of its longest edge squared. Larger weights of
+thinner triangles would hardly change the functions there, but would cost single precision its digits."""
+LINK_WEIGHT = 1.0
+"""Weight of a link: of the order of an edge between two equilateral triangles, which has 0.58."""
 MIN_MASS = 1e-3
-"""Least mass of a vertex, as a fraction of the mean."""
+"""Least mass of a vertex, as a fraction of the mean: slivers can leave a vertex none, and M must have an inverse."""
 
 
 def stiffness_matrix(mesh: TriangleMesh) -> csc_matrix:
     """Stiffness matrix S of the cotangent weights.
 
-    S_ij = −(cot α_ij + cot β_ij) / 2 for an edge ij, with the angles opposite to it; −1 for a link; S_ii = −Σ_j S_ij.
+    S_ij = −(cot α_ij + cot β_ij) / 2 for an edge ij with opposite angles α, β; −1 for a link; S_ii = −Σ_j S_ij.
 
     Parameters
     ----------
     mesh : TriangleMesh
-        With n vertices. A face without area counts as a very thin one, so that no weight is infinite.
+        With n vertices. A face without area counts as a very thin one, so that all weights are finite.
 
     Returns
     -------
@@ -36,14 +36,14 @@ def stiffness_matrix(mesh: TriangleMesh) -> csc_matrix:
     """
     i, j = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     i, j = np.append(i, mesh.links[:, 0]), np.append(j, mesh.links[:, 1])
-    of_edges = half_cotangents(mesh.lengths, mesh.face_areas * mesh.layers) / mesh.layers
-    weight = np.append(of_edges.ravel(), np.full(len(mesh.links), LINK))
+    edge_weights = half_cotangents(mesh.lengths, mesh.face_areas * mesh.layers) / mesh.layers
+    weight = np.append(edge_weights.ravel(), np.full(len(mesh.links), LINK_WEIGHT))
     weights = csr_matrix((np.append(weight, weight), (np.append(i, j), np.append(j, i))), shape=(mesh.n_vertices,) * 2)
     return csc_matrix(diags(np.asarray(weights.sum(axis=1)).ravel()) - weights)
 
 
 def half_cotangents(lengths: FloatArray, areas: FloatArray) -> FloatArray:
-    """(m, 3) half the cotangent of the angle opposite to each edge, of triangles with (m, 3) lengths and (m,) areas."""
+    """(m, 3) half the cotangent of the angle opposite to each edge, from (m, 3) lengths of edges and (m,) areas."""
     squared = lengths**2
     floor = MIN_DOUBLE_AREA * squared.max(axis=1)
     # cot γ = (a² + b² − c²) / (4 · area), with c opposite to γ
@@ -52,15 +52,15 @@ def half_cotangents(lengths: FloatArray, areas: FloatArray) -> FloatArray:
 
 
 def mass_matrix(mesh: TriangleMesh, lumped: bool = True) -> csc_matrix:
-    """Mass matrix M: the area that belongs to each vertex.
+    """Mass matrix M: the areas of the vertices.
 
     Parameters
     ----------
     mesh : TriangleMesh
         With n vertices.
     lumped : bool
-        True: diagonal, a third of the triangles around a vertex. False: the consistent matrix of linear elements
-        (a sixth of a triangle on the diagonal, a twelfth beside it).
+        True: diagonal, with a third of the area of the triangles around each vertex. False: the consistent matrix of
+        linear elements (a sixth of the area of a triangle on the diagonal, a twelfth off the diagonal).
 
     Returns
     -------
@@ -75,6 +75,6 @@ def mass_matrix(mesh: TriangleMesh, lumped: bool = True) -> csc_matrix:
 
 
 def unit_area_masses(mesh: TriangleMesh) -> FloatArray:
-    """(n,) lumped masses of the surface scaled to area 1, none of them zero (slivers can leave a vertex none)."""
+    """(n,) lumped masses of the surface scaled to area 1, none of them below `MIN_MASS` times the mean."""
     masses = mesh.vertex_areas / mesh.area
     return np.maximum(masses, MIN_MASS * masses.mean())

@@ -1,4 +1,4 @@
-"""Signatures: what a point of a surface sees of the spectrum. The same in every pose, up to stretching.
+"""Signatures of the points of a surface, made from its spectrum: the same in every pose that does not stretch it.
 
 Wave Kernel Signature: Aubry, Schlickewei and Cremers, "The wave kernel signature: a quantum mechanical approach to
 shape analysis" (2011). Heat Kernel Signature: Sun, Ovsjanikov and Guibas (2009).
@@ -12,29 +12,33 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..mesh.triangle_mesh import FloatArray, TriangleMesh
+from ..message import Message
+from ..progress import Progress
+from ..threads import one_blas_thread
 from .eigenpairs import Accuracy, Panels, eigenpair_panels
 
 ZERO_EIGENVALUE = 1e-8
-"""An eigenvalue up to this fraction of the largest one counts as zero: a constant on a component."""
+"""Fraction of the largest eigenvalue up to which an eigenvalue counts as zero: a function that is constant on an
+island."""
 BAND_WIDTH = 7.0
-"""σ in steps of the energy axis, as in the paper."""
+"""σ in steps of the energies, as in the paper."""
 ENERGY_MARGIN = 1.02
 """The energies end at log(E_N) / 1.02, as in the paper."""
-ROWS = 16_384
-"""Vertices in one block: their squared eigenfunctions take 40 MB at 300 pairs."""
+SIGNATURE_ROWS = 16_384
+"""Vertices in one block: their squared eigenfunctions take 40 MB for 300 pairs in double precision."""
 
 
 def wave_kernel_signature(values: ArrayLike, functions: ArrayLike, n_energies: int = 100) -> FloatArray:
     """Wave Kernel Signature of every vertex.
 
     WKS(x, e) = (1 / C_e) Σ_k exp(−(e − log E_k)² / 2σ²) φ_k(x)², with C_e = Σ_k exp(−(e − log E_k)² / 2σ²), at M
-    equally spaced energies e from log E_1 to log(E_N) / 1.02, both among them, σ = 7 (e_max − e_min) / M.
+    equally spaced energies e from log E_1 to log(E_N) / 1.02, both included, σ = 7 (e_max − e_min) / M.
     The mean over the surface is 1 at every energy, if its area is 1.
 
     Parameters
     ----------
     values : (k,) array of float
-        Eigenvalues of the surface scaled to area 1, rising. Zero modes take no part.
+        Eigenvalues of the surface scaled to area 1, rising. Zero modes are left out.
     functions : (n, k) array of float
         Eigenfunctions at the vertices, orthonormal under the mass matrix.
     n_energies : int
@@ -47,40 +51,51 @@ def wave_kernel_signature(values: ArrayLike, functions: ArrayLike, n_energies: i
     Raises
     ------
     ValueError
-        If the shapes do not fit, or fewer than two eigenvalues are above zero.
+        If the shapes do not match, or fewer than two eigenvalues are above zero.
     """
     values, functions = _checked_pairs(values, functions)
-    return _squares_times(_whole(functions), _energy_weights(values, n_energies), functions.shape[0])
+    return _weighted_squares(_one_panel(functions), _energy_weights(values, n_energies), functions.shape[0])
 
 
+@one_blas_thread
 def wave_kernel_signature_of(
     mesh: TriangleMesh,
     n_pairs: int = 300,
     n_energies: int = 100,
     accuracy: Accuracy = "fast",
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | Progress | None = None,
 ) -> FloatArray:
-    """`wave_kernel_signature` of the eigenpairs of a mesh, which are not kept: they would take more memory than it.
+    """`wave_kernel_signature` of the eigenpairs of a mesh, without holding all eigenfunctions in memory.
 
     For parameters and errors see `eigenpairs` and `wave_kernel_signature`.
     """
     values, place, panels = eigenpair_panels(mesh, n_pairs, accuracy, progress)
-    return _squares_times(panels, _energy_weights(values, n_energies), mesh.n_vertices)[place]
+    return _weighted_squares(panels, _energy_weights(values, n_energies), mesh.n_vertices)[place]
 
 
 def _energy_weights(values: FloatArray, n_energies: int) -> FloatArray:
-    """(k, n_energies) share of each eigenpair in the signature at each energy; zero modes have none."""
+    """(k, n_energies) weight of each eigenpair in the signature at each energy; 0 for zero modes."""
     if n_energies < 2:
-        raise ValueError(f"n_energies must be at least 2, not {n_energies}")
+        raise ValueError(Message("n_energies must be at least 2, not {value!r}", value=n_energies))
     kept = values > ZERO_EIGENVALUE * values.max()
     if kept.sum() < 2:
-        raise ValueError(f"the signature needs two eigenvalues above zero, of {len(values)} there are {kept.sum()}")
+        raise ValueError(
+            Message(
+                "the signature needs two eigenvalues above zero; of {total} eigenvalues, {count} are",
+                total=len(values),
+                count=kept.sum(),
+            )
+        )
     logs = np.log(values[kept])
-    # Below one the paper's division by 1.02 would move the end upwards; it is a margin, so never past log E_N.
+    # Of a negative logarithm, the paper's division by 1.02 would raise the end above log E_N.
     first, last = logs[0], min(logs[-1] / ENERGY_MARGIN, logs[-1])
     if last <= first:
         raise ValueError(
-            f"the eigenvalues {values[kept][0]:.4g} to {values[kept][-1]:.4g} span no energies: take more pairs"
+            Message(
+                "the eigenvalues {first:.4g} to {last:.4g} span no energies: compute more pairs",
+                first=values[kept][0],
+                last=values[kept][-1],
+            )
         )
     sigma = BAND_WIDTH * (last - first) / n_energies
     energies = np.linspace(first, last, n_energies)
@@ -97,11 +112,11 @@ def heat_kernel_signature(
     Parameters
     ----------
     values, functions
-        As for `wave_kernel_signature`; here the zero mode takes part.
+        See `wave_kernel_signature`; here zero modes are included.
     n_times : int
         Number of times, in equal logarithmic steps from 4 ln 10 / E_N to 4 ln 10 / E_1 (Sun et al.).
     times : (t,) array of float, optional
-        The times themselves instead.
+        Times to use instead.
 
     Returns
     -------
@@ -110,7 +125,7 @@ def heat_kernel_signature(
     Raises
     ------
     ValueError
-        If the shapes do not fit, or no eigenvalue is above zero.
+        If the shapes do not match, or no eigenvalue is above zero.
     """
     values, functions = _checked_pairs(values, functions)
     if times is None:
@@ -119,34 +134,38 @@ def heat_kernel_signature(
             raise ValueError("the signature needs an eigenvalue above zero")
         times = np.geomspace(4 * np.log(10) / above[-1], 4 * np.log(10) / above[0], n_times)
     weights = np.exp(-np.outer(values, np.asarray(times, dtype=np.float64)))
-    return _squares_times(_whole(functions), weights, functions.shape[0])
+    return _weighted_squares(_one_panel(functions), weights, functions.shape[0])
 
 
 def _checked_pairs(values: ArrayLike, functions: ArrayLike) -> tuple[FloatArray, FloatArray]:
     values, functions = np.asarray(values, dtype=np.float64), np.asarray(functions)
     if values.ndim != 1 or functions.ndim != 2 or functions.shape[1] != len(values) or not len(values):
         raise ValueError(
-            f"values must have the shape (k,) and functions (n, k), not {values.shape} and {functions.shape}"
+            Message(
+                "values must have the shape (k,) and functions (n, k), not {values} and {functions}",
+                values=values.shape,
+                functions=functions.shape,
+            )
         )
     if (np.diff(values) < 0).any():
         raise ValueError("the eigenvalues must rise")
     return values, functions
 
 
-def _whole(functions: FloatArray) -> Panels:
+def _one_panel(functions: FloatArray) -> Panels:
     """All functions as one panel."""
     return iter([(slice(0, functions.shape[1]), functions)])
 
 
-def _squares_times(panels: Panels, weights: FloatArray, n_vertices: int) -> FloatArray:
-    """functions² @ weights of functions that come in panels of columns, a block of rows at a time."""
+def _weighted_squares(panels: Panels, weights: FloatArray, n_vertices: int) -> FloatArray:
+    """(n, M) product of the squared functions with (k, M) weights; panels are computed a block of rows at a time."""
     result: FloatArray | None = None
     for columns, panel in panels:
-        of_panel = weights[columns].astype(panel.dtype)  # single precision stays single
+        panel_weights = weights[columns].astype(panel.dtype)  # single precision stays single
         if result is None:
             result = np.zeros((n_vertices, weights.shape[1]), dtype=panel.dtype)
-        for start in range(0, n_vertices, ROWS):
-            rows = slice(start, start + ROWS)
-            result[rows] += panel[rows] ** 2 @ of_panel
+        for start in range(0, n_vertices, SIGNATURE_ROWS):
+            rows = slice(start, start + SIGNATURE_ROWS)
+            result[rows] += panel[rows] ** 2 @ panel_weights
     assert result is not None
     return result
