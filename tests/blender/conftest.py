@@ -34,11 +34,6 @@ def pytest_collection_finish(session):
     session.config.stash[SESSION] = session
 
 
-def pytest_terminal_summary(terminalreporter):
-    if not HAS_BPY:
-        terminalreporter.write_line("bpy is not installed: the tests of the Blender part were left out", yellow=True)
-
-
 @pytest.hookimpl(trylast=True)
 def pytest_unconfigure(config):
     """End the process before Blender does: 4.2 crashes at a normal exit, 4.5 hangs."""
@@ -60,6 +55,26 @@ def extension(tmp_path_factory):
     wks_segment.blender.unregister()
     # pytest would do it as the process ends, but see pytest_unconfigure; later runs keep a locked folder for days.
     (tmp_path_factory.getbasetemp() / ".lock").unlink(missing_ok=True)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def learned_once():
+    """Models are learned once a process, where many tests learn the same."""
+    if not HAS_BPY:
+        yield None
+        return
+    from learned_once import LearnedOnce
+
+    with LearnedOnce.shared() as once:
+        yield once
+
+
+@pytest.fixture
+def learns_anew(learned_once):
+    """For a test of what happens while a model is learned."""
+    learned_once.anew = True
+    yield
+    learned_once.anew = False
 
 
 @pytest.fixture

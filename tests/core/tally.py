@@ -11,6 +11,17 @@ def count(what, names, outcome):
         OUTCOMES[what, name][outcome] += 1
 
 
+def counted():
+    """All counts, as lists that one process can send to another."""
+    return [[*names, outcome, n] for names, counter in OUTCOMES.items() for outcome, n in counter.items()]
+
+
+def add(counts):
+    """The counts of another process."""
+    for what, name, outcome, n in counts:
+        OUTCOMES[what, name][outcome] += n
+
+
 def table():
     """Markdown lines; none if nothing was counted."""
     lines = []

@@ -100,6 +100,7 @@ def run(operator, **properties):
 # The result
 
 
+@pytest.mark.usefixtures("learns_anew")
 @pytest.mark.parametrize("sides", ["one", "two"])
 def test_job_writes_what_a_script_gets(poses, settings, sides, tmp_path):
     settings.sides = sides
@@ -199,6 +200,7 @@ def test_writing_waits_until_blender_can_undo_it(poses, at):
 # Cancel
 
 
+@pytest.mark.usefixtures("learns_anew")
 @pytest.mark.parametrize("stage", STAGES)
 def test_escape_ends_it_at_every_stage_and_nothing_is_written(poses, at, stage):
     before = scene_snapshot()
@@ -337,6 +339,7 @@ def test_what_takes_away_its_meshes_ends_it(poses, at, happens, reason, stage):
         bpy.ops.object.mode_set(mode="OBJECT")
 
 
+@pytest.mark.usefixtures("learns_anew")
 def test_blender_that_takes_the_window_away_ends_it(poses, at):
     before = scene_snapshot()
     ran, go_on = at("Learning")
@@ -350,6 +353,7 @@ def test_blender_that_takes_the_window_away_ends_it(poses, at):
     assert OPS.learn() == {"FINISHED"}
 
 
+@pytest.mark.usefixtures("learns_anew")
 def test_extension_that_is_disabled_ends_it(poses, at, extension, monkeypatch):
     monkeypatch.setattr(background_job, "PATIENCE", 0.1)
     meshes = {pose.name: snapshot(pose.data) for pose in poses}
