@@ -1,6 +1,6 @@
-"""Meshes with what goes wrong in practice: a base shape, and defects that change its vertices and faces.
+"""Meshes with the defects that occur in practice: a base shape, and functions that damage its vertices and faces.
 
-`any_mesh` is a hypothesis strategy of (vertices, faces, names of the defects); `DEFECTS` lists what it draws from.
+`any_mesh` is a hypothesis strategy of (vertices, faces, names of the defects); `DEFECTS` lists the defects that it draws.
 """
 
 import numpy as np
@@ -19,12 +19,12 @@ def arrays(mesh):
 
 
 def soup(generator):
-    """Triangles that share nothing, anywhere."""
+    """Random triangles that share no vertices."""
     return generator.standard_normal((3 * 60, 3)), np.arange(3 * 60).reshape(-1, 3)
 
 
 def scattered(generator):
-    """Triangles between vertices taken at random: edges of many faces, everything crosses everything."""
+    """Triangles between random vertices: edges with many faces, and faces that intersect each other."""
     faces = generator.integers(0, 40, (150, 3))
     return generator.standard_normal((40, 3)), faces[np.apply_along_axis(lambda f: len(set(f)) == 3, 1, faces)]
 
@@ -39,16 +39,16 @@ BASES = {
 }
 
 
-def some(generator, count, share=0.1):
+def random_indices(generator, count, share=0.1):
     return generator.choice(count, max(1, round(share * count)), replace=False)
 
 
 def open_border(vertices, faces, generator):
-    return vertices, np.delete(faces, some(generator, len(faces), 0.2), axis=0)
+    return vertices, np.delete(faces, random_indices(generator, len(faces), 0.2), axis=0)
 
 
 def duplicate_faces(vertices, faces, generator):
-    return vertices, np.concatenate([faces, faces[some(generator, len(faces))]])
+    return vertices, np.concatenate([faces, faces[random_indices(generator, len(faces))]])
 
 
 def two_sided(vertices, faces, generator):
@@ -57,13 +57,13 @@ def two_sided(vertices, faces, generator):
 
 def mixed_orientation(vertices, faces, generator):
     faces = faces.copy()
-    turned = some(generator, len(faces), 0.4)
+    turned = random_indices(generator, len(faces), 0.4)
     faces[turned] = faces[turned, ::-1]
     return vertices, faces
 
 
 def edges_of_three_faces(vertices, faces, generator):
-    chosen = faces[some(generator, len(faces), 0.05)]
+    chosen = faces[random_indices(generator, len(faces), 0.05)]
     tips = vertices[chosen].mean(axis=1) + 0.3 * generator.standard_normal((len(chosen), 3))
     fins = np.column_stack([chosen[:, :2], len(vertices) + np.arange(len(chosen))])
     return np.concatenate([vertices, tips]), np.concatenate([faces, fins])
@@ -71,14 +71,14 @@ def edges_of_three_faces(vertices, faces, generator):
 
 def faces_without_area(vertices, faces, generator):
     vertices = vertices.copy()
-    chosen = faces[some(generator, len(faces), 0.1)]
+    chosen = faces[random_indices(generator, len(faces), 0.1)]
     vertices[chosen[:, 0]] = vertices[chosen[:, 1]]
     return vertices, faces
 
 
 def faces_on_a_line(vertices, faces, generator):
     vertices = vertices.copy()
-    chosen = faces[some(generator, len(faces), 0.05)]
+    chosen = faces[random_indices(generator, len(faces), 0.05)]
     vertices[chosen[:, 2]] = vertices[chosen[:, :2]].mean(axis=1)
     return vertices, faces
 
@@ -93,17 +93,17 @@ def unwelded(vertices, faces, generator):
 
 def half_welded(vertices, faces, generator):
     faces = faces.copy()
-    chosen = some(generator, len(faces), 0.3)
-    loose = vertices[faces[chosen]].reshape(-1, 3)
-    faces[chosen] = len(vertices) + np.arange(len(loose)).reshape(-1, 3)
-    return np.concatenate([vertices, loose]), faces
+    chosen = random_indices(generator, len(faces), 0.3)
+    split = vertices[faces[chosen]].reshape(-1, 3)
+    faces[chosen] = len(vertices) + np.arange(len(split)).reshape(-1, 3)
+    return np.concatenate([vertices, split]), faces
 
 
-def loose_parts(vertices, faces, generator):
-    small, of_small = tetrahedron()
+def small_islands(vertices, faces, generator):
+    small, small_faces = tetrahedron()
     size = np.ptp(vertices, axis=0).max()
     for _ in range(12):
-        faces = np.concatenate([faces, of_small + len(vertices)])
+        faces = np.concatenate([faces, small_faces + len(vertices)])
         vertices = np.concatenate([vertices, size * (0.05 * small + generator.standard_normal(3))])
     return vertices, faces
 
@@ -123,7 +123,7 @@ def noise(vertices, faces, generator):
 
 def spikes(vertices, faces, generator):
     vertices = vertices.copy()
-    chosen = some(generator, len(vertices), 0.02)
+    chosen = random_indices(generator, len(vertices), 0.02)
     vertices[chosen] += 5 * generator.standard_normal((len(chosen), 3)) * np.ptp(vertices, axis=0).max()
     return vertices, faces
 
@@ -166,7 +166,7 @@ DEFECTS = {
     defect.__name__: defect
     for defect in (
         open_border, duplicate_faces, two_sided, mixed_orientation, edges_of_three_faces, faces_without_area,
-        faces_on_a_line, isolated_vertices, unwelded, half_welded, loose_parts, inside_each_other, glued, noise, spikes,
+        faces_on_a_line, isolated_vertices, unwelded, half_welded, small_islands, inside_each_other, glued, noise, spikes,
         flat, needle, tiny, huge, far_from_the_origin, all_at_one_place, not_finite, beyond_single_precision,
     )
 }  # fmt: skip

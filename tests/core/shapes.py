@@ -1,4 +1,4 @@
-"""Meshes with known truth, made by arithmetic."""
+"""Meshes made by formulas, so that the right answers are known."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from wks_segment.core import TriangleMesh
 
 
 def icosphere(subdivisions):
-    """Unit sphere of 20 · 4^subdivisions nearly equal triangles."""
+    """Unit sphere of 20 · 4^subdivisions triangles of nearly equal size."""
     golden = (1 + 5**0.5) / 2
     vertices = np.array(
         [(-1, golden, 0), (1, golden, 0), (-1, -golden, 0), (1, -golden, 0), (0, -1, golden), (0, 1, golden),
@@ -28,7 +28,7 @@ def icosphere(subdivisions):
 
 
 def grid(nx, ny, width=1.0, height=1.0):
-    """Flat rectangle of nx × ny cells, with alternating diagonals so that no direction is favored."""
+    """Flat rectangle of nx × ny cells, with alternating diagonals so that both directions are equal."""
     x, y = np.meshgrid(np.linspace(0, width, nx + 1), np.linspace(0, height, ny + 1), indexing="ij")
     vertices = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
     faces = []
@@ -40,14 +40,14 @@ def grid(nx, ny, width=1.0, height=1.0):
 
 
 def creature(bend=0.0, subdivisions=4, seed=None):
-    """Sphere with a long limb, two short ones and a thin one; `bend` (radians) turns the limbs: a pose."""
+    """Sphere with a long limb, two short ones and a thin one, in a pose in which the limbs are bent (radians)."""
     sphere = icosphere(subdivisions)
     points = sphere.vertices.copy()
     limbs = (((1, 0, 0), 3.0, 0.35), ((-0.6, 0.8, 0), 1.2, 0.45), ((-0.6, -0.8, 0), 1.2, 0.45), ((0, 0, 1), 2.0, 0.25))
     for axis, length, width in limbs:
         angle = np.arccos(np.clip(points @ np.asarray(axis, float) / np.linalg.norm(points, axis=1), -1, 1))
         points = points + length * np.exp(-((angle / width) ** 2))[:, None] * np.asarray(axis, float)
-    # Beyond the body the limbs turn about z, more the further out: nearly isometric.
+    # The limbs turn about z, the more the further out they are: a nearly isometric deformation.
     out = np.maximum(np.linalg.norm(points, axis=1) - 1.2, 0)
     turn = bend * out / 3
     x, y, z = points.T
@@ -61,7 +61,7 @@ def creature(bend=0.0, subdivisions=4, seed=None):
 
 
 def shaken(mesh, amount=0.35, seed=0):
-    """The same surface with vertices moved along their edges: irregular triangles, thin ones among them."""
+    """The mesh with vertices moved along edges: irregular triangles, some of them thin."""
     generator = np.random.default_rng(seed)
     edge = mesh.faces[:, [0, 1]]
     target = np.arange(mesh.n_vertices)
@@ -71,12 +71,12 @@ def shaken(mesh, amount=0.35, seed=0):
 
 
 def split_at_every_corner(mesh):
-    """The same surface as a triangle soup: each corner has a vertex of its own."""
+    """The mesh as a triangle soup: each corner of a face has a vertex of its own."""
     return TriangleMesh(mesh.vertices[mesh.faces].reshape(-1, 3), np.arange(3 * mesh.n_faces).reshape(-1, 3))
 
 
 def together(*meshes):
-    """Several meshes as loose parts of one."""
+    """Several meshes as the islands of one."""
     starts = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
     return TriangleMesh(
         np.concatenate([mesh.vertices for mesh in meshes]),
@@ -92,14 +92,14 @@ LIMBS = {
 
 
 def figure(left=0.0, right=0.0, subdivisions=4):
-    """A body that looks towards −y, as in Blender, with arms and legs; `left` and `right` (radians) lift a side."""
+    """Body with arms and legs that faces −y, as in Blender; `left` and `right` (radians) lift the limbs of a side."""
     sphere = icosphere(subdivisions)
     points = sphere.vertices.copy()
     for axis, length, width in LIMBS.values():
         unit = np.array(axis) / np.linalg.norm(axis)
         angle = np.arccos(np.clip(sphere.vertices @ unit, -1, 1))
         points = points + length * np.exp(-((angle / width) ** 2))[:, None] * unit
-    # Beyond the body either side turns about y, more the further out: nearly isometric.
+    # Each side turns about y, the more the further out it is: a nearly isometric deformation.
     out = np.maximum(np.abs(points[:, 0]) - 0.8, 0)
     turn = np.where(points[:, 0] > 0, left, -right) * out / 2
     x, y, z = points.T

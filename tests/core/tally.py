@@ -1,14 +1,14 @@
-"""Counts what the property-based tests tried and what came of it, for the summary of a run."""
+"""Counts the examples of property-based tests and their outcomes, for the summary of a run."""
 
 from collections import Counter, defaultdict
 
 OUTCOMES = defaultdict(Counter)
 
 
-def count(what, names, outcome):
-    """One example of a kind ("mesh"), the names of what was in it, and how it ended ("labeled")."""
+def count(kind, names, outcome):
+    """Count an example: its kind ("mesh"), the names of its defects, and its outcome ("labeled")."""
     for name in ("all", *dict.fromkeys(names)):
-        OUTCOMES[what, name][outcome] += 1
+        OUTCOMES[kind, name][outcome] += 1
 
 
 def counted():
@@ -23,7 +23,7 @@ def add(counts):
 
 
 def table():
-    """Markdown lines; none if nothing was counted."""
+    """Lines of Markdown tables; none if nothing was counted."""
     lines = []
     for kind in dict.fromkeys(kind for kind, _ in OUTCOMES):
         rows = {name: counter for (of, name), counter in OUTCOMES.items() if of == kind}

@@ -22,7 +22,7 @@ def adjacency_of(surface):
     return FaceAdjacency.of(surface.welded_faces, surface.original.vertices)
 
 
-def test_faces_turn_outward_however_they_come():
+def test_outward_does_not_depend_on_the_orientation_of_faces():
     sphere = together(icosphere(2), TriangleMesh(icosphere(2).vertices + 5, icosphere(2).faces[:, ::-1]))
     faces = sphere.faces.copy()
     chosen = np.random.default_rng(0).random(len(faces)) < 0.5
@@ -35,7 +35,7 @@ def test_faces_turn_outward_however_they_come():
 
 
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_sphere_is_as_thick_and_as_curved_as_its_radius(turned):
+def test_thickness_and_curvature_of_a_sphere(turned):
     sphere = icosphere(4)
     surface = prepare_surface(TriangleMesh(sphere.vertices, sphere.faces[:, ::-1]) if turned else sphere)
     normals = smooth_normals(vertex_normals(surface), HeatFlow(surface.mesh, FINE))
@@ -44,7 +44,7 @@ def test_a_sphere_is_as_thick_and_as_curved_as_its_radius(turned):
     np.testing.assert_allclose(curvature_across(surface, normals, adjacency_of(surface)), 1 / radius, rtol=0.15)
 
 
-def test_a_sheet_is_thin_on_a_coarse_mesh_too():
+def test_a_sheet_is_thin_on_a_coarse_mesh():
     sphere = icosphere(3)
     sheet = TriangleMesh(sphere.vertices * (1, 1, 0.02), sphere.faces)
     surface = prepare_surface(sheet)
@@ -54,8 +54,8 @@ def test_a_sheet_is_thin_on_a_coarse_mesh_too():
     assert np.median(thickness[middle]) * np.sqrt(sheet.area) < 0.03
 
 
-def test_borders_weigh_least_in_a_crease():
-    # Two balls grown together: the crease is where x is 0.
+def test_border_weights_are_least_in_a_crease():
+    # Two merged balls with a crease at x = 0.
     sphere = icosphere(4)
     x = sphere.vertices[:, 0]
     pushed = sphere.vertices + np.outer(np.sign(x) * 0.6 * np.exp(-((x / 0.5) ** 2) / 2), (1, 0, 0))

@@ -18,14 +18,14 @@ def adjacency_of(mesh):
 
 
 def random_energy(random, n, count):
-    """Any costs at all between n nodes, pairs that repeat among them."""
+    """Energy with random costs on n nodes, in which pairs occur several times."""
     pairs = random.integers(0, n, (2 * n, 2))
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
     return Energy.of(random.random((n, count)), pairs, random.random(len(pairs)))
 
 
 def split_at(mesh, x, blur=LENGTH):
-    """Posteriors of two labels that meet where the first coordinate is x, as heat flow over a length leaves them."""
+    """Posteriors of two labels that meet where the first coordinate is x, as if smoothed over a length."""
     share = 1 / (1 + np.exp(2 * (mesh.face_centers[:, 0] - x) / blur))
     return np.stack([share, 1 - share], axis=1)
 
@@ -37,13 +37,13 @@ def cut(mesh, posteriors, weights=None, labels=None, **style):
 
 
 def at_line(mesh, x):
-    """Which pairs of neighbors have the line between them on which the first coordinate is x."""
+    """Whether the line where the first coordinate is x separates each pair of neighbors."""
     side = mesh.face_centers[adjacency_of(mesh).pairs, 0] > x
     return side[:, 0] != side[:, 1]
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_two_labels_come_out_as_brute_force_finds_them(seed):
+def test_two_labels_reach_the_minimum_that_brute_force_finds(seed):
     random = np.random.default_rng(seed)
     energy = random_energy(random, 9, 2)
     found = minimize_energy(energy, random.integers(0, 2, 9), np.ones((9, 2), dtype=bool))
@@ -51,23 +51,23 @@ def test_two_labels_come_out_as_brute_force_finds_them(seed):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_an_expansion_is_the_best_there_is(seed):
+def test_an_expansion_is_the_best_of_all_moves(seed):
     random = np.random.default_rng(seed)
     energy, labels = random_energy(random, 9, 4), random.integers(0, 4, 9)
     nodes = np.flatnonzero((labels != 2) & (random.random(9) < 0.8))
-    takes = expansion(energy, labels, 2, nodes, np.arange(len(energy.pairs)))
-    assert set(takes) <= set(nodes)
+    switching = expansion(energy, labels, 2, nodes, np.arange(len(energy.pairs)))
+    assert set(switching) <= set(nodes)
     tried = []
     for chosen in product([False, True], repeat=len(nodes)):
         tried.append(labels.copy())
         tried[-1][nodes[np.array(chosen, dtype=bool)]] = 2
     found = labels.copy()
-    found[takes] = 2
+    found[switching] = 2
     assert energy.at(found) == min(map(energy.at, tried))
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_the_energy_never_rises_and_the_result_depends_on_nothing_else(seed):
+def test_the_energy_never_rises_and_the_result_is_deterministic(seed):
     random = np.random.default_rng(seed)
     energy, labels = random_energy(random, 300, 6), random.integers(0, 6, 300)
     allowed = random.random((300, 6)) < 0.5
@@ -75,23 +75,23 @@ def test_the_energy_never_rises_and_the_result_depends_on_nothing_else(seed):
     moving = labels.copy()
     for label in [*range(6), *range(6)]:
         nodes = np.flatnonzero(allowed[:, label] & (moving != label))
-        takes = expansion(energy, moving, label, nodes, np.arange(len(energy.pairs)))
-        moving[takes] = label
-        assert energy.at(moving) <= so_far - len(takes[:1])
+        switching = expansion(energy, moving, label, nodes, np.arange(len(energy.pairs)))
+        moving[switching] = label
+        assert energy.at(moving) <= so_far - len(switching[:1])
         so_far = energy.at(moving)
     found = minimize_energy(energy, labels, allowed)
     so_far = energy.at(found)
     assert so_far < energy.at(labels)
     assert (allowed[np.arange(300), found] | (found == labels)).all()
     np.testing.assert_array_equal(minimize_energy(energy, labels, allowed), found)
-    # Nor can any one label still lower it, those included that were there at first.
+    # No expansion of a single label lowers the energy further, the labels at the start included.
     allowed[np.arange(300), labels] = True
     for label in range(6):
         nodes = np.flatnonzero(allowed[:, label] & (found != label))
         assert not len(expansion(energy, found, label, nodes, np.arange(len(energy.pairs))))
 
 
-def test_costs_fit_into_what_flows_can_hold_however_large_they_are():
+def test_costs_of_any_size_fit_into_32_bits():
     pairs = np.array([(0, 1), (1, 2)])
     for size in (0.0, 1e-300, 1e-9, 1e12):
         energy = Energy.of(size * np.array([[0, 1], [1, 0], [0, 3.0]]), pairs, size * np.array([5.0, 0.5]))
@@ -100,7 +100,7 @@ def test_costs_fit_into_what_flows_can_hold_however_large_they_are():
         assert found.tolist() == ([0, 1, 1] if size < 1e-200 else [0, 0, 0])
 
 
-def test_a_border_snaps_to_a_marked_edge_within_reach():
+def test_a_border_snaps_to_a_nearby_marked_edge():
     mesh = grid(60, 60)
     near, far = at_line(mesh, 0.55), at_line(mesh, 0.8)
     marked = cut(mesh, split_at(mesh, 0.5), np.where(near | far, 0.1, 1.0))
@@ -109,7 +109,7 @@ def test_a_border_snaps_to_a_marked_edge_within_reach():
     np.testing.assert_array_equal(out_of_reach, mesh.face_centers[:, 0] > 0.5)
 
 
-def test_a_border_snaps_to_a_crease_within_reach():
+def test_a_border_snaps_to_a_nearby_crease():
     sphere = icosphere(5)
     x = sphere.vertices[:, 0]
     waist = 1 - 0.1 * np.exp(-((x / 0.1) ** 2))
@@ -127,8 +127,8 @@ def test_a_border_snaps_to_a_crease_within_reach():
     assert (posteriors.argmax(axis=1) != found)[~in_crease].any()
 
 
-def test_what_one_label_took_another_can_take_back():
-    # The first label gains what is cheap to it; only then it shows that both do better with the second.
+def test_a_node_can_go_back_to_its_first_label():
+    # An expansion of the first label takes a node that is better off with the second one after a later expansion.
     data = np.array([(0.0, 9), (1, 1.2), (1, 1.2), (9, 0)])
     energy = Energy.of(data, np.array([(0, 1), (1, 2), (2, 3)]), np.array([0.1, 1.0, 0.5]))
     for start in ([0, 0, 1, 1], [0, 1, 1, 1], [0, 0, 0, 1]):
@@ -152,13 +152,13 @@ def test_a_jagged_border_becomes_short():
     assert (found[abs(x - 0.5) > 0.05] == (x > 0.5)[abs(x - 0.5) > 0.05]).all()
 
 
-def test_nothing_changes_outside_the_band_and_no_label_comes_from_nowhere():
+def test_labels_change_only_in_the_band_and_only_to_labels_nearby():
     mesh = grid(50, 50)
     random = np.random.default_rng(0)
     x = mesh.face_centers[:, 0]
     posteriors = np.zeros((mesh.n_faces, 5))
     posteriors[np.arange(mesh.n_faces), np.where(x < 0.3, 0, np.where(x < 0.7, 1, 4))] = 0.2
-    # What is almost as likely everywhere, but the likeliest nowhere, must not come up.
+    # A label that is almost as likely everywhere, but the likeliest nowhere, must not appear.
     posteriors[:, 2] = 0.19
     weights = random.random(len(adjacency_of(mesh).pairs))
     before = posteriors.argmax(axis=1)
@@ -170,7 +170,7 @@ def test_nothing_changes_outside_the_band_and_no_label_comes_from_nowhere():
     np.testing.assert_array_equal(cut(mesh, posteriors, weights, strength=3.0, width=0.01), before)
 
 
-def test_scale_changes_nothing():
+def test_the_scale_of_the_mesh_does_not_matter():
     mesh = creature(0.3, 4)
     x = mesh.face_centers[:, 0]
     posteriors = np.stack([np.exp(-((x - place) ** 2)) for place in (-1, 0, 1, 2)], axis=1)
@@ -182,7 +182,7 @@ def test_scale_changes_nothing():
         assert (scaled == found).mean() > 0.999
 
 
-def test_faces_that_take_no_part_stay_so_and_are_no_neighbors():
+def test_faces_without_a_label_stay_without_and_are_no_neighbors():
     mesh = grid(40, 40)
     before = (mesh.face_centers[:, 0] > 0.5).astype(int)
     before[np.random.default_rng(0).random(mesh.n_faces) < 0.1] = -1
@@ -191,7 +191,7 @@ def test_faces_that_take_no_part_stay_so_and_are_no_neighbors():
     np.testing.assert_array_equal(found == -1, before == -1)
 
 
-def test_loose_faces_and_faces_without_neighbors_keep_their_labels():
+def test_faces_without_neighbors_keep_their_labels():
     mesh = grid(4, 4)
     soup = TriangleMesh(mesh.vertices[mesh.faces].reshape(-1, 3), np.arange(3 * mesh.n_faces).reshape(-1, 3))
     posteriors = np.random.default_rng(0).dirichlet(np.ones(6), soup.n_faces)
@@ -201,10 +201,10 @@ def test_loose_faces_and_faces_without_neighbors_keep_their_labels():
     assert set(cut(both, posteriors, strength=2.0)[-soup.n_faces :]) == {1}
 
 
-def test_a_face_alone_and_polygons_that_share_several_edges():
+def test_a_single_face_and_polygons_that_share_several_edges():
     alone = TriangleMesh(np.eye(3), np.array([(0, 1, 2)]))
     assert cut(alone, np.array([[0.3, 0.7]])).tolist() == [1]
-    # The one in the middle hangs on two edges with the left one, on one with the right one.
+    # The middle polygon shares two edges with the left one and one edge with the right one.
     pairs = FaceAdjacency(np.array([(0, 1), (1, 0), (1, 2)]), np.ones(3))
     posteriors = np.array([[0.9, 0.1], [0.45, 0.55], [0.1, 0.9]])
     centers = np.array([(0, 0, 0), (1, 0, 0), (2, 0, 0)])

@@ -6,7 +6,7 @@ from wks_segment.core.geometry.heat_flow import HeatFlow
 from wks_segment.core.spectral.laplacian import unit_area_masses
 
 
-def test_smoothing_keeps_sums_and_does_not_depend_on_the_meshing():
+def test_smoothing_preserves_sums_and_does_not_depend_on_the_meshing():
     results = []
     for n in (30, 60):
         mesh = grid(n, n)
@@ -17,7 +17,7 @@ def test_smoothing_keeps_sums_and_does_not_depend_on_the_meshing():
     np.testing.assert_allclose(results[0], results[1], atol=0.06)
 
 
-def test_smoothing_of_needles_that_single_precision_cannot_hold():
+def test_needles_are_smoothed_in_double_precision():
     random = np.random.default_rng(0)
     vertices = random.standard_normal((60, 3))
     faces = np.array([random.choice(60, 3, replace=False) for _ in range(150)])

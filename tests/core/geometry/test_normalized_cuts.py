@@ -9,7 +9,7 @@ from wks_segment.core.learning.merge_tree import Ground
 
 
 def dumbbell(rings=60, around=40):
-    """Two balls of radius 1 that are grown together by a neck of radius 0.35."""
+    """Two balls of radius 1, joined by a neck of radius 0.35."""
     x = -2 * np.cos(np.linspace(0, np.pi, rings + 2))[1:-1]
     radius = np.maximum(np.sqrt(np.maximum(1 - (np.abs(x) - 1) ** 2, 0)), np.where(np.abs(x) < 1, 0.35, 0))
     turn = np.linspace(0, 2 * np.pi, around, endpoint=False)
@@ -26,8 +26,8 @@ def dumbbell(rings=60, around=40):
     return TriangleMesh(np.concatenate([tube.T, [(-2, 0, 0), (2, 0, 0)]]), np.concatenate(faces))
 
 
-def test_patches_grow_together_across_what_is_not_a_border():
-    # Six squares in a row; between the third and the fourth a crease.
+def test_patches_are_joined_except_across_a_crease():
+    # Six squares in a row, with a crease between the third and the fourth.
     pairs = np.stack([np.arange(5), np.arange(1, 6)], axis=1)
     borders = 0.4 * np.array([1, 1, 0.01, 1, 1])
     areas = np.full(6, 1 / 6)
@@ -36,8 +36,8 @@ def test_patches_grow_together_across_what_is_not_a_border():
     assert normalized_cut(np.arange(6), areas, pairs, borders, 100.0).max() == 5
 
 
-def test_thousands_of_loose_patches_are_no_table_of_all_with_all():
-    # 20,000 pairs of patches, each pair by itself: all with all would be 12 GB.
+def test_thousands_of_islands_need_no_table_of_all_pairs():
+    # 20,000 islands of two patches: a table of all pairs would take 12 GB.
     n = 20_000
     pairs = np.arange(2 * n).reshape(n, 2)
     borders = np.where(np.arange(n) % 2, 0.01, 0.0)
@@ -56,18 +56,18 @@ def test_a_dumbbell_has_two_parts_that_meet_at_its_neck():
     assert left != right
 
 
-def test_loose_parts_stay_apart():
+def test_islands_are_different_parts():
     body, ball = creature(0.3, 4), icosphere(2)
     surface = prepare_surface(together(body, TriangleMesh(ball.vertices + 9, ball.faces)), pieces="separate")
     for part in Ground.of(surface).part:
         assert not set(part[: body.n_faces]) & set(part[body.n_faces :])
 
 
-def test_labels_are_compared_with_parts_as_people_are_with_each_other():
+def test_labels_are_compared_with_parts_by_rand_index():
     ground = Ground.of(prepare_surface(dumbbell()))
     shares = ground.surface.original.face_areas / ground.surface.original.area
     alone = replace(ground, part=ground.part[1:2])
     assert alone.unlike_parts(ground.part[1]) < 1e-9
-    # All in one: wrong for each pair of faces that the parts keep apart.
+    # One label for all faces is wrong for each pair of faces in different parts.
     apart = np.mean([1 - np.square(np.bincount(part, shares)).sum() for part in ground.part])
     np.testing.assert_allclose(ground.unlike_parts(np.zeros(len(shares), dtype=int)), apart)

@@ -13,7 +13,7 @@ def graph_of(mesh):
     return FaceGraph(mesh.face_areas, mesh.face_centers, adjacency_of(mesh))
 
 
-def test_neighbors_of_a_closed_surface():
+def test_each_edge_of_a_closed_surface_has_two_neighbors():
     mesh = icosphere(2)
     adjacency = adjacency_of(mesh)
     assert len(adjacency.pairs) == 3 * mesh.n_faces // 2
@@ -21,7 +21,7 @@ def test_neighbors_of_a_closed_surface():
     assert set(shared) == {2}
 
 
-def test_faces_at_an_edge_of_three_hang_together():
+def test_three_faces_at_one_edge_are_connected():
     vertices = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1)]
     faces = np.array([(0, 1, 2), (0, 1, 3), (0, 1, 4)])
     regions = connected_regions(np.zeros(3, int), FaceAdjacency.of(faces, np.array(vertices, float)))
@@ -36,30 +36,30 @@ def test_regions_are_connected_and_numbered_by_label():
     assert [int(labels[regions == r][0]) for r in range(5)] == [0, 0, 0, 1, 1]
 
 
-def test_crumbs_join_the_neighbor_with_the_longest_border():
+def test_a_small_region_joins_the_neighbor_with_the_longest_border():
     mesh = grid(20, 20)
     x, y = mesh.face_centers[:, :2].T
     labels = (x > 0.5).astype(int)
-    crumb = (abs(x - 0.2) < 0.05) & (abs(y - 0.5) < 0.05)
-    labels[crumb] = 2
+    small = (abs(x - 0.2) < 0.05) & (abs(y - 0.5) < 0.05)
+    labels[small] = 2
     cleaned, _ = merge_small_regions(labels, graph_of(mesh), 0.05)
     assert set(cleaned) == {0, 1}
-    assert (cleaned[crumb] == 0).all()
-    np.testing.assert_array_equal(cleaned[~crumb], labels[~crumb])
+    assert (cleaned[small] == 0).all()
+    np.testing.assert_array_equal(cleaned[~small], labels[~small])
 
 
-def test_a_band_between_two_parts_that_is_small_for_its_label_joins_one_of_them():
+def test_a_band_that_is_small_compared_with_its_label_joins_a_neighbor():
     mesh = grid(40, 10)
     x = mesh.face_centers[:, 0]
     labels = np.where(x < 0.4, 0, np.where(x < 0.45, 2, np.where(x < 0.65, 1, 2)))
     band = (labels == 2) & (x < 0.5)
-    for least_of_largest, there in ((0.1, {2}), (0.2, {0, 1})):
-        cleaned, _ = merge_small_regions(labels, graph_of(mesh), 0.005, least_of_largest)
-        assert set(cleaned[band]) <= there
+    for min_share_of_largest, expected in ((0.1, {2}), (0.2, {0, 1})):
+        cleaned, _ = merge_small_regions(labels, graph_of(mesh), 0.005, min_share_of_largest)
+        assert set(cleaned[band]) <= expected
         np.testing.assert_array_equal(cleaned[~band], labels[~band])
 
 
-def test_two_bands_side_by_side_do_not_keep_each_other():
+def test_of_two_adjacent_bands_neither_keeps_the_other():
     mesh = grid(100, 10)
     x = mesh.face_centers[:, 0] * 100
     labels = np.select([x < 30, x < 32, x < 34.5, x < 55, x < 75], [0, 2, 3, 1, 2], 3)
@@ -69,7 +69,7 @@ def test_two_bands_side_by_side_do_not_keep_each_other():
     np.testing.assert_array_equal(cleaned[~bands], labels[~bands])
 
 
-def test_after_cleaning_no_part_is_too_small_and_large_ones_keep_their_label():
+def test_after_merging_no_region_is_too_small_and_large_ones_keep_their_label():
     mesh = creature(0.2)
     labels = np.random.default_rng(0).integers(0, 5, mesh.n_faces)
     labels[mesh.face_centers[:, 0] > 0] = 3
@@ -80,7 +80,7 @@ def test_after_cleaning_no_part_is_too_small_and_large_ones_keep_their_label():
     assert (cleaned[mesh.face_centers[:, 0] > 0] == 3).all()
 
 
-def test_a_small_loose_piece_takes_the_label_of_what_is_next_to_it():
+def test_a_small_island_takes_the_label_of_the_nearest_face():
     big, eye = icosphere(3), icosphere(1)
     mesh = together(big, TriangleMesh(0.02 * eye.vertices + (1.03, 0, 0), eye.faces))
     labels = (mesh.face_centers[:, 0] > 0).astype(int)
@@ -89,8 +89,8 @@ def test_a_small_loose_piece_takes_the_label_of_what_is_next_to_it():
     assert set(cleaned[big.n_faces :]) == {1}
 
 
-def test_a_mesh_of_nothing_but_crumbs_stays_as_it_is():
-    pieces = together(*[TriangleMesh(icosphere(1).vertices + 3 * i, icosphere(1).faces) for i in range(4)])
-    labels = np.arange(pieces.n_faces) // icosphere(1).n_faces
-    cleaned, _ = merge_small_regions(labels, graph_of(pieces), 0.9)
+def test_labels_stay_if_every_region_is_too_small():
+    mesh = together(*[TriangleMesh(icosphere(1).vertices + 3 * i, icosphere(1).faces) for i in range(4)])
+    labels = np.arange(mesh.n_faces) // icosphere(1).n_faces
+    cleaned, _ = merge_small_regions(labels, graph_of(mesh), 0.9)
     np.testing.assert_array_equal(cleaned, labels)

@@ -1,4 +1,4 @@
-"""Whatever the mesh: labels for every face, or an error that says what is wrong. `make fuzz` tries thousands."""
+"""Any mesh gets labels for every face, or an error that says what is wrong with it. `make fuzz` tries thousands."""
 
 import numpy as np
 from defects import any_mesh
@@ -26,7 +26,7 @@ def model_of_a_good_mesh():
 
 
 @given(any_mesh())
-def test_labels_or_a_reason(drawn):
+def test_a_mesh_is_labeled_or_the_error_says_why_not(drawn):
     vertices, faces, names = drawn
     try:
         mesh = TriangleMesh(vertices, faces)
@@ -46,7 +46,7 @@ def test_labels_or_a_reason(drawn):
 
 
 @given(any_mesh())
-def test_learned_or_a_reason(drawn):
+def test_a_mesh_is_learned_or_the_error_says_why_not(drawn):
     vertices, faces, names = drawn
     try:
         mesh = TriangleMesh(vertices, faces)

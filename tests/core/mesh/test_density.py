@@ -1,4 +1,4 @@
-"""How finely a region is meshed must not change its labels."""
+"""Labels do not depend on how finely each side of a mesh is triangulated."""
 
 import numpy as np
 import pytest
@@ -12,9 +12,9 @@ UNSEEN = (0.25, 0.25)
 
 
 def finer_on_one_side(mesh, axis=0, rounds=1):
-    """Each triangle on one side split into four, those beside them so that no vertex lies on an edge.
+    """Mesh with each triangle on one side split into four, and their neighbors so that no vertex lies on an edge.
 
-    Returns the mesh and, for each of its faces, the one that it is a piece of.
+    Returns the mesh and, for each of its faces, the old face that contains it.
     """
     owner = np.arange(mesh.n_faces)
     vertices, faces = mesh.vertices, mesh.faces
@@ -32,13 +32,13 @@ def finer_on_one_side(mesh, axis=0, rounds=1):
         for i, ((a, b, c), (ab, bc, ca)) in enumerate(zip(faces.tolist(), middle[which].tolist(), strict=True)):
             corners = [v for v in (a, ab, b, bc, c, ca) if v >= 0]
             if len(corners) == 6:
-                pieces = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+                triangles = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
             else:
                 start = next((k for k, v in enumerate(corners) if v in (ab, bc, ca) and v >= 0), 0)
                 fan = corners[start:] + corners[:start]
-                pieces = [(fan[0], fan[k], fan[k + 1]) for k in range(1, len(fan) - 1)]
-            new += pieces
-            of += [owner[i]] * len(pieces)
+                triangles = [(fan[0], fan[k], fan[k + 1]) for k in range(1, len(fan) - 1)]
+            new += triangles
+            of += [owner[i]] * len(triangles)
         faces, owner = np.array(new), np.array(of)
     return TriangleMesh(vertices, faces), owner
 
@@ -48,27 +48,27 @@ def model():
     return PoseSegmentation(**SMALL).fit([figure(*bend) for bend in BENDS])
 
 
-def share_alike(found, owner, expected, finer, mesh):
-    """Share of the area of the faces whose pieces mostly have their label: a border follows what edges there are."""
+def share_of_equal_labels(labels, owner, expected, finer, mesh):
+    """Share of the area of the faces of `mesh` that have the label of most of their area in `finer`."""
     areas = np.zeros((mesh.n_faces, SMALL["n_segments"]))
-    np.add.at(areas, (owner, found), finer.face_areas)
+    np.add.at(areas, (owner, labels), finer.face_areas)
     return np.average(areas.argmax(axis=1) == expected, weights=mesh.face_areas)
 
 
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("rounds", [1, 2])
-def test_labels_of_a_mesh_that_is_finer_on_one_side(model, axis, rounds):
+def test_a_mesh_that_is_finer_on_one_side_gets_the_same_labels(model, axis, rounds):
     mesh = figure(*UNSEEN)
     expected = model.segment_faces(mesh)
     finer, owner = finer_on_one_side(mesh, axis, rounds)
     assert finer.area == pytest.approx(mesh.area)
-    assert share_alike(model.segment_faces(finer), owner, expected, finer, mesh) > 0.97
+    assert share_of_equal_labels(model.segment_faces(finer), owner, expected, finer, mesh) > 0.97
 
 
-def test_what_is_learned_from_meshes_that_are_finer_on_one_side():
+def test_a_model_of_meshes_that_are_finer_on_one_side_labels_both_alike():
     uneven = PoseSegmentation(**SMALL).fit([finer_on_one_side(figure(*bend), rounds=2)[0] for bend in BENDS])
     mesh = figure(*UNSEEN)
     expected = uneven.segment_faces(mesh)
     assert len(np.unique(expected)) == SMALL["n_segments"]
     finer, owner = finer_on_one_side(mesh, rounds=2)
-    assert share_alike(uneven.segment_faces(finer), owner, expected, finer, mesh) > 0.97
+    assert share_of_equal_labels(uneven.segment_faces(finer), owner, expected, finer, mesh) > 0.97

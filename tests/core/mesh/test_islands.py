@@ -1,4 +1,4 @@
-"""Loose parts that belong together share one spectrum, in the same way in every pose."""
+"""Islands are tied together in the same way in every pose, so that they share one spectrum."""
 
 import numpy as np
 import pytest
@@ -12,37 +12,37 @@ def ball(x, y=0.0, z=0.0, size=1.0):
     return TriangleMesh(size * sphere.vertices + (x, y, z), sphere.faces)
 
 
-def tied_parts(connection, faces):
-    """The pairs of loose parts that are tied."""
-    part = TriangleMesh(np.random.default_rng(0).random((faces.max() + 1, 3)), faces).components
-    return {tuple(sorted(pair)) for pair in part[connection.ties].tolist()}
+def tied_islands(connection, faces):
+    """Pairs of islands that are tied."""
+    island = TriangleMesh(np.random.default_rng(0).random((faces.max() + 1, 3)), faces).components
+    return {tuple(sorted(pair)) for pair in island[connection.ties].tolist()}
 
 
 def test_a_row_of_balls_is_tied_into_a_chain():
     row = together(*(ball(2.1 * i) for i in (0, 2, 1, 3)))
-    assert tied_parts(connect(row), row.faces) == {(0, 2), (1, 2), (1, 3)}
+    assert tied_islands(connect(row), row.faces) == {(0, 2), (1, 2), (1, 3)}
     assert prepare_surface(row).n_components == 1
     assert prepare_surface(row, pieces="separate").n_components == 4
 
 
-def test_parts_that_meet_by_chance_in_one_pose_are_tied_where_they_stay_together():
-    # The last ball of the chain swings round to the first in one pose.
+def test_islands_are_tied_where_they_stay_near_and_not_where_they_meet_in_one_pose():
+    # In one pose, the last ball of the chain touches the first.
     poses = [
         together(ball(0), ball(2.1), ball(4.2), ball(*last)) for last in ((6.3, 0, 0), (4.2, 2.1, 0), (2.1, 2.0, 0))
     ]
-    assert tied_parts(connect(*poses), poses[0].faces) == {(0, 1), (1, 2), (2, 3)}
-    assert tied_parts(connect(poses[2]), poses[0].faces) != {(0, 1), (1, 2), (2, 3)}
+    assert tied_islands(connect(*poses), poses[0].faces) == {(0, 1), (1, 2), (2, 3)}
+    assert tied_islands(connect(poses[2]), poses[0].faces) != {(0, 1), (1, 2), (2, 3)}
 
 
-def test_the_rest_position_decides_where_there_is_one():
+def test_the_rest_position_decides_the_ties_if_it_is_given():
     rest, bent = (together(ball(0), ball(2.1), ball(*last)) for last in ((4.2, 0, 0), (0, 2.05, 0)))
     ties = connect(bent, rest=rest).ties
     np.testing.assert_array_equal(ties, connect(rest).ties)
-    assert tied_parts(connect(bent, rest=rest), rest.faces) == {(0, 1), (1, 2)}
+    assert tied_islands(connect(bent, rest=rest), rest.faces) == {(0, 1), (1, 2)}
 
 
-def test_alike_parts_in_other_places_get_other_labels_if_joined():
-    # Two balls of one size, one on the end of a long body, one on its side.
+def test_equal_islands_in_different_places_get_different_labels_if_joined():
+    # Two balls of the same size, one at the end of a long body, one at its side.
     def figure(bend):
         body = icosphere(4)
         long = TriangleMesh(body.vertices * (6, 1, 1), body.faces)
@@ -59,9 +59,9 @@ def test_alike_parts_in_other_places_get_other_labels_if_joined():
     assert labels["joined"] < 0.5
 
 
-def test_many_parts_far_apart_are_tied_in_reasonable_time():
+def test_hundreds_of_distant_islands_are_tied():
     generator = np.random.default_rng(0)
-    parts = together(*(ball(*generator.uniform(0, 200, 3), 0.5) for _ in range(300)))
-    connection = connect(parts)
-    assert prepare_surface(parts, connection=connection).n_components == 1
-    assert len(tied_parts(connection, parts.faces)) == 299
+    mesh = together(*(ball(*generator.uniform(0, 200, 3), 0.5) for _ in range(300)))
+    connection = connect(mesh)
+    assert prepare_surface(mesh, connection=connection).n_components == 1
+    assert len(tied_islands(connection, mesh.faces)) == 299

@@ -32,12 +32,12 @@ def test_area_of_the_sphere():
         ([(0, 0, 0), (1, 0, 0), (2, 0, 0)], [(0, 1, 2)], "the mesh has no area"),
     ],
 )
-def test_a_defect_is_named_with_its_place(vertices, faces, message):
+def test_the_error_names_the_defect_and_where_it_is(vertices, faces, message):
     with pytest.raises(ValueError, match=message):
         TriangleMesh(vertices, faces)
 
 
-def test_the_mesh_keeps_its_own_copy():
+def test_the_mesh_has_read_only_copies_of_its_arrays():
     vertices = np.array(TRIANGLE, dtype=float)
     mesh = TriangleMesh(vertices, [(0, 1, 2)])
     vertices[0] = 9

@@ -18,7 +18,7 @@ def cells_of(mesh, n_cells):
 
 
 @pytest.mark.parametrize("mesh", [icosphere(4), creature(0.4), grid(50, 40)], ids=["sphere", "limbs", "rectangle"])
-def test_cells_are_many_enough_connected_and_not_heavy(mesh):
+def test_cells_are_connected_not_too_heavy_and_as_many_as_asked_for(mesh):
     mesh = unit_area(mesh)
     cell, count, (a, b) = cells_of(mesh, 200)
     assert 150 < count < 600
@@ -28,7 +28,7 @@ def test_cells_are_many_enough_connected_and_not_heavy(mesh):
     assert components_of_pairs(np.stack([a[inside], b[inside]], axis=1), mesh.n_vertices).max() + 1 == count
 
 
-def test_sheets_that_lie_close_have_cells_of_their_own():
+def test_cells_do_not_span_two_nearby_sheets():
     lower, upper = grid(30, 30), grid(30, 30)
     mesh = unit_area(together(lower, TriangleMesh(upper.vertices + (0, 0, 1e-3), upper.faces)))
     cell, _, _ = cells_of(mesh, 100)
@@ -36,14 +36,14 @@ def test_sheets_that_lie_close_have_cells_of_their_own():
 
 
 @pytest.mark.parametrize("wide", [False, True])
-def test_prolongation_carries_constants_everywhere_and_slopes_inside_a_plane(wide):
+def test_prolongation_reproduces_constants_and_linear_functions_inside_a_plane(wide):
     mesh = unit_area(grid(60, 60))
     prolongation, cells = Level.of(mesh).coarsened(150, wide)
     np.testing.assert_allclose(prolongation @ np.ones(prolongation.shape[1]), 1.0, atol=1e-5)
     inside = (np.abs(mesh.vertices[:, :2] - mesh.vertices[:, :2].mean(axis=0)) < 0.3).all(axis=1)
     for axis in range(2):
-        carried = prolongation @ cells.positions[:, axis]
-        np.testing.assert_allclose(carried[inside], mesh.vertices[inside, axis], atol=2e-3)
+        linear = prolongation @ cells.positions[:, axis]
+        np.testing.assert_allclose(linear[inside], mesh.vertices[inside, axis], atol=2e-3)
 
 
 def test_prolongation_does_not_depend_on_the_orientation_of_faces():
@@ -61,13 +61,15 @@ def test_a_level_of_cells_has_the_area_and_nearly_the_energy_of_the_surface():
     assert cells.areas.sum() == pytest.approx(1)
     assert cells.mass.sum() == pytest.approx(1, rel=1e-5)
     for axis in range(3):
-        here, there = mesh.vertices[:, axis], cells.positions[:, axis]
-        assert there @ cells.stiffness @ there == pytest.approx(here @ level.stiffness @ here, rel=0.03)
-        difference = prolongation @ there - here
-        assert difference @ level.stiffness @ difference < 0.03 * (here @ level.stiffness @ here)
+        on_surface, on_cells = mesh.vertices[:, axis], cells.positions[:, axis]
+        assert on_cells @ cells.stiffness @ on_cells == pytest.approx(
+            on_surface @ level.stiffness @ on_surface, rel=0.03
+        )
+        difference = prolongation @ on_cells - on_surface
+        assert difference @ level.stiffness @ difference < 0.03 * (on_surface @ level.stiffness @ on_surface)
 
 
-def test_coarse_eigenvalues_are_upper_bounds_and_near():
+def test_coarse_eigenvalues_are_close_upper_bounds():
     mesh = unit_area(icosphere(5))
     _, cells = Level.of(mesh).coarsened(400, wide=True)
     values, vectors = coarse_eigenpairs(cells, 1, 24)
@@ -77,6 +79,6 @@ def test_coarse_eigenvalues_are_upper_bounds_and_near():
     np.testing.assert_allclose(vectors.T @ (cells.mass @ vectors), np.eye(24), atol=1e-4)
 
 
-def test_a_tiny_surface_still_works():
+def test_a_tiny_surface_can_be_coarsened():
     prolongation, _ = Level.of(unit_area(icosphere(0))).coarsened(4)
     np.testing.assert_allclose(prolongation @ np.ones(prolongation.shape[1]), 1.0, atol=1e-5)

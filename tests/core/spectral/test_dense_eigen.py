@@ -1,4 +1,4 @@
-"""Dense eigenpairs: SciPy's, but without Python's lock."""
+"""Dense eigenpairs are those of SciPy, computed without Python's lock."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def test_eigenpairs_are_those_of_scipy(n, count):
     assert (values.dtype, vectors.dtype, vectors.shape) == (np.float32, np.float32, (n, min(n, count)))
 
 
-def test_where_the_function_is_another_it_is_scipys_call(monkeypatch):
+def test_scipy_is_called_if_its_lapack_has_another_interface(monkeypatch):
     matrix = symmetric(40)
     values, vectors = lowest_eigenpairs(matrix, 5)
     monkeypatch.setattr(dense_eigen, "_syevr", lambda: None)
@@ -32,11 +32,11 @@ def test_where_the_function_is_another_it_is_scipys_call(monkeypatch):
     np.testing.assert_allclose(np.abs((vectors * directions).sum(axis=0)), 1, atol=1e-3)
 
 
-def test_bundled_scipy_is_called_without_the_lock():
+def test_lapack_of_the_installed_scipy_is_called_directly():
     assert dense_eigen._syevr() is not None
 
 
-def test_matrix_is_left_as_it_was():
+def test_the_matrix_does_not_change():
     matrix = np.asfortranarray(symmetric(20))
     before = matrix.copy()
     lowest_eigenpairs(matrix, 3)
@@ -44,7 +44,7 @@ def test_matrix_is_left_as_it_was():
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_entry_that_is_not_finite_is_refused(bad):
+def test_an_entry_that_is_not_finite_is_an_error(bad):
     matrix = symmetric(4)
     matrix[2, 1] = bad
     with pytest.raises(LinAlgError, match="not finite"):
@@ -52,7 +52,7 @@ def test_entry_that_is_not_finite_is_refused(bad):
 
 
 @pytest.mark.parametrize("transposed", [False, True])
-def test_solutions_in_panels_are_those_at_once(transposed):
+def test_solving_in_blocks_of_columns_changes_nothing(transposed):
     matrix = symmetric(60)
     factor = np.linalg.cholesky(matrix @ matrix.T + 60 * np.eye(60, dtype=np.float32))
     right = np.random.default_rng(0).standard_normal((60, 2 * SOLVE_COLUMNS + 3)).astype(np.float32)

@@ -34,7 +34,7 @@ def test_pairs_solve_the_problem_and_are_orthonormal(n_pairs):
     mass = mass_matrix(mesh) / mesh.area
     np.testing.assert_allclose(functions.T @ mass @ functions, np.eye(n_pairs), atol=1e-8)
     residual = stiffness_matrix(mesh) @ functions - mass @ functions * values
-    # In the norm of M⁻¹, relative to the value; the zero mode against 1.
+    # In the norm of M⁻¹, relative to the eigenvalue; for the zero mode relative to 1.
     size = np.sqrt((residual**2 / mass.diagonal()[:, None]).sum(axis=0))
     assert (size / np.maximum(values, 1)).max() < 1e-8
     assert (np.diff(values) >= 0).all()
@@ -50,20 +50,20 @@ def test_iterative_and_dense_solver_agree(monkeypatch):
 
 
 @pytest.mark.parametrize(("accuracy", "tolerance"), [("exact", 1e-8), ("fast", 5e-3)])
-def test_equal_components_have_every_eigenvalue_as_often_as_there_are_of_them(monkeypatch, accuracy, tolerance):
+def test_equal_islands_have_equal_eigenvalues(monkeypatch, accuracy, tolerance):
     monkeypatch.setattr(module, "DENSE_BELOW", 0)
     one = creature(0.2, 3)
     apart = [TriangleMesh(one.vertices + 20 * i, one.faces) for i in range(4)]
     values, _ = eigenpairs(together(*apart), 80, accuracy)
-    # Four times the area: on the scale of area 1 the values of one are four times as large.
+    # On the scale of area 1, the eigenvalues of one of four islands are four times as large.
     single, _ = eigenpairs(one, 20, "exact")
     np.testing.assert_allclose(values, np.repeat(4 * single, 4), rtol=tolerance, atol=1e-8)
 
 
 @pytest.mark.parametrize("radius", [0.05, 0.002, 1e-4])
 @pytest.mark.parametrize("n_pairs", [40, 150])
-def test_parts_that_hang_by_a_thread_are_solved_exactly(radius, n_pairs):
-    # A first eigenvalue near zero, beside the zero mode itself.
+def test_spheres_joined_by_a_thin_tube_are_solved_exactly(radius, n_pairs):
+    # The first eigenvalue after the zero mode is near zero.
     first, second = icosphere(4), icosphere(4)
     thread = radius * np.array([(0, 1, 0), (0, -0.5, 0.87), (0, -0.5, -0.87)])
     vertices = np.concatenate([first.vertices, second.vertices + (3, 0, 0), thread + (1, 0, 0), thread + (2, 0, 0)])
@@ -80,7 +80,7 @@ def test_parts_that_hang_by_a_thread_are_solved_exactly(radius, n_pairs):
     np.testing.assert_allclose(functions.T @ mass @ functions, np.eye(n_pairs), atol=1e-8)
 
 
-def test_polish_takes_away_what_is_just_above_the_known_pairs_too():
+def test_polishing_removes_errors_just_above_the_known_pairs():
     mesh = creature(0.3, 3)
     known = 40
     problem = module._Problem.of(mesh)
@@ -94,7 +94,7 @@ def test_polish_takes_away_what_is_just_above_the_known_pairs_too():
     lanczos.check_eigenpairs(operator, wrong_values, wrong)
 
 
-def test_each_component_has_a_zero_mode():
+def test_each_island_has_a_zero_mode():
     values, functions = eigenpairs(together(icosphere(2), grid(6, 6)), 10)
     assert (values[:2] == 0).all()
     assert values[2] > 1
@@ -102,8 +102,8 @@ def test_each_component_has_a_zero_mode():
         assert len(np.unique(functions[:, k].round(12))) == 2
 
 
-def test_missed_pairs_are_found_again(monkeypatch):
-    # A Lanczos run that drops pairs, as some do with clusters, must be noticed and mended.
+def test_missed_pairs_are_found(monkeypatch):
+    # Lanczos can miss pairs of clusters; the inertia count must notice that, and the repair must find them.
     monkeypatch.setattr(module, "DENSE_BELOW", 0)
     mesh = creature(0.3, 3)
     expected, _ = eigenpairs(mesh, 50, "exact")
@@ -123,7 +123,7 @@ def test_missed_pairs_are_found_again(monkeypatch):
     np.testing.assert_allclose(values, expected, rtol=1e-9, atol=1e-9)
 
 
-def test_inaccurate_pairs_are_refused(monkeypatch):
+def test_inaccurate_pairs_are_an_error(monkeypatch):
     monkeypatch.setattr(module, "DENSE_BELOW", 0)
     monkeypatch.setattr(lanczos, "EXACT_TOLERANCE", 1e-20)
     monkeypatch.setattr(lanczos, "ROUNDING", 0.0)
@@ -147,25 +147,25 @@ def test_fast_falls_back_to_exact_with_a_warning(monkeypatch):
         ({"accuracy": "rough"}, "accuracy must be one of"),
     ],
 )
-def test_bad_parameters_are_named(change, message):
+def test_an_error_names_the_parameter(change, message):
     with pytest.raises(ValueError, match=message):
         eigenpairs(icosphere(2), **{"n_pairs": 10, **change})
 
 
-def test_a_vertex_without_a_face_is_named():
+def test_an_error_names_a_vertex_without_a_face():
     mesh = grid(3, 3)
     with pytest.raises(ValueError, match="vertex 16 belongs to no face"):
         eigenpairs(TriangleMesh(np.concatenate([mesh.vertices, [(5, 5, 5)]]), mesh.faces), 5)
 
 
-def test_more_pairs_than_vertices_are_as_many_as_there_are_and_it_says_so():
+def test_a_mesh_with_fewer_vertices_than_pairs_has_fewer_pairs_with_a_warning():
     with pytest.warns(UserWarning, match="only 12 vertices"):
         values, functions = eigenpairs(icosphere(0), 300)
     assert values.shape == (12,)
     assert functions.shape == (12, 12)
 
 
-def test_memory_that_does_not_suffice_is_said_before(monkeypatch):
+def test_too_little_memory_is_an_error_before_the_solve(monkeypatch):
     monkeypatch.setattr(module, "available_memory", lambda: 10_000_000)
     with pytest.raises(
         MemoryError, match=r"60 eigenpairs of 10,242 vertices .fast. need about 36 MB .* only 10 MB are free"
@@ -176,7 +176,7 @@ def test_memory_that_does_not_suffice_is_said_before(monkeypatch):
 IRREGULAR = {
     "limbs": creature(0.4, 5),
     "irregular": shaken(creature(0.4, 5)),
-    "parts": together(creature(0.2, 4), grid(60, 40)),
+    "islands": together(creature(0.2, 4), grid(60, 40)),
 }
 
 
@@ -194,7 +194,7 @@ def test_fast_pairs_agree_with_exact_ones(monkeypatch, name, path):
     np.testing.assert_allclose(values, expected, rtol=0.03 if path == "cells between" else 0.012, atol=1e-8)
     mass = mass_matrix(mesh) / mesh.area
     covered = np.linalg.norm(functions.T @ mass @ approximate, axis=0)
-    # All but the last ones, which may be mixed with those behind them.
+    # Except the last ones, which may be mixed with the first ones that were not asked for.
     np.testing.assert_allclose(covered[:70], 1, atol=0.02)
 
 
@@ -215,7 +215,7 @@ def test_progress_rises_and_an_error_from_it_ends_the_solve(accuracy):
 
     with pytest.raises(ValueError, match="enough"):
         eigenpairs(creature(0.3, 4), 60, accuracy, stop)
-    assert len(refused) == 1  # not taken for an error of the solver, which would start another
+    assert len(refused) == 1  # not taken for an error of the fast solver, after which the exact one would start
 
 
 @pytest.mark.parametrize("accuracy", ["fast", "exact"])
@@ -233,7 +233,7 @@ def test_available_memory_is_a_plausible_number_of_bytes():
     assert 2**20 < available_memory() < 2**50
 
 
-def test_many_loose_parts_have_all_pairs_that_were_asked_for(monkeypatch):
+def test_many_islands_have_all_pairs_that_were_asked_for(monkeypatch):
     one = creature(0.2, 2)
     mesh = together(*(TriangleMesh(one.vertices + 20 * i, one.faces) for i in range(40)))
     for n_pairs in (41, 80):

@@ -8,7 +8,7 @@ from wks_segment.core.spectral.intrinsic_delaunay import better_triangles, is_fu
 
 
 def with_caps(mesh, share=1.0, height=0.005):
-    """A vertex just beside an edge of each face (or of a share of them): triangles with angles near 180 degrees."""
+    """Mesh with a new vertex close to an edge of each face, or of a share of them: angles near 180 degrees."""
     random = np.random.default_rng(0)
     chosen = random.random(mesh.n_faces) < share
     a, b, c = mesh.faces[chosen].T
@@ -33,7 +33,7 @@ def lowest_weight(mesh):
 
 
 def glued_sheets():
-    """Three half planes that meet in one line, each with its own random points."""
+    """Three half planes that meet in a line, each with random points."""
     random = np.random.default_rng(2)
     vertices, faces = [np.stack([np.linspace(0, 1, 6), np.zeros(6), np.zeros(6)], axis=1)], []
     for angle in (0.0, 2.0, 4.0):
@@ -47,7 +47,7 @@ def glued_sheets():
 
 
 def random_triangulation(inner, border):
-    """Triangles between points of the unit square: each point in turn cuts the one that it falls in into three."""
+    """Triangulation of the unit square: each point in turn splits the triangle that it is in into three."""
     points = np.concatenate([border, inner])
     middle = len(points)
     points = np.concatenate([points, [(0.5, 0.5)]])
@@ -62,7 +62,7 @@ def random_triangulation(inner, border):
     return points, np.array(faces)
 
 
-def test_in_the_plane_it_is_the_delaunay_triangulation():
+def test_in_the_plane_the_result_is_the_delaunay_triangulation():
     steps = np.arange(8) / 8
     border = np.concatenate([[(t, 0), (1, t), (1 - t, 1), (0, 1 - t)] for t in steps])
     border = border[np.argsort(np.arctan2(*(border - 0.5).T))]
@@ -71,7 +71,8 @@ def test_in_the_plane_it_is_the_delaunay_triangulation():
     mesh = TriangleMesh(flat, faces)
     expected = stiffness_matrix(TriangleMesh(flat, Delaunay(points).simplices))
     assert abs(stiffness_matrix(mesh) - expected).max() > 10
-    assert abs(stiffness_matrix(delaunay(mesh)) - expected).max() < 1e-2  # of twice ten: what flips of slivers lose
+    # Weights are about 10; flips of slivers lose digits.
+    assert abs(stiffness_matrix(delaunay(mesh)) - expected).max() < 1e-2
 
 
 @pytest.mark.parametrize(
@@ -89,17 +90,17 @@ def test_no_weight_is_negative_and_the_surface_is_the_same(mesh):
 
 
 @pytest.mark.parametrize("mesh", [with_caps(creature(0.5, 2)), glued_sheets()], ids=["creature", "three sheets"])
-def test_orientation_of_faces_does_not_count(mesh):
+def test_the_orientation_of_faces_does_not_matter(mesh):
     assert abs(stiffness_matrix(delaunay(mesh)) - stiffness_matrix(delaunay(turned_at_random(mesh)))).max() < 1e-6
 
 
-def test_a_good_mesh_stays_as_it_is():
+def test_a_mesh_without_slivers_does_not_change():
     sphere = icosphere(2)
     assert better_triangles(sphere, "auto") == (sphere, "cotangent")
     assert abs(stiffness_matrix(delaunay(sphere)) - stiffness_matrix(sphere)).max() < 1e-9
 
 
-def test_slivers_are_seen_and_their_spectrum_is_better():
+def test_slivers_are_detected_and_the_spectrum_improves():
     coarse = icosphere(1)
     slivers = with_caps(with_caps(coarse))
     assert is_full_of_slivers(slivers)
@@ -112,14 +113,14 @@ def test_slivers_are_seen_and_their_spectrum_is_better():
 
 
 @pytest.mark.parametrize("accuracy", ["fast", "exact"])
-def test_both_solvers_take_it_at_any_scale(accuracy):
+def test_both_solvers_accept_the_result_at_any_scale(accuracy):
     better = delaunay(with_caps(creature(0.5, 3)))
     smaller = TriangleMesh(better.vertices / 1000, better.faces, None, better.lengths / 1000, better.layers)
     values = eigenpairs(better, 40, accuracy)[0]
     np.testing.assert_allclose(values, eigenpairs(smaller, 40, accuracy)[0], rtol=1e-3, atol=1e-9)
 
 
-def test_the_model_chooses_by_itself_and_can_be_told():
+def test_the_model_chooses_the_laplacian_unless_it_is_given():
     mesh = with_caps(creature(0.5, 3), 0.7)
     used = {
         laplacian: PoseSegmentation(4, n_eigenpairs=30, laplacian=laplacian).describe(mesh).laplacian
@@ -130,6 +131,6 @@ def test_the_model_chooses_by_itself_and_can_be_told():
         PoseSegmentation(laplacian="umbrella").describe(mesh)
 
 
-def test_lengths_that_are_none_are_refused():
+def test_lengths_that_are_not_finite_are_an_error():
     with pytest.raises(ValueError, match="lengths must be 1 × 3 finite numbers"):
         TriangleMesh(np.eye(3), [(0, 1, 2)], lengths=[(1, 1, np.nan)])

@@ -16,7 +16,7 @@ def test_stiffness_has_constants_in_its_null_space(mesh):
 
 
 def test_stiffness_of_one_triangle_by_hand():
-    # Right angle at vertex 0, 45° at the others: the edge opposite to the right angle has no weight.
+    # The edge opposite to the right angle at vertex 0 has the weight 0.
     mesh = TriangleMesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)])
     expected = [[1.0, -0.5, -0.5], [-0.5, 0.5, 0.0], [-0.5, 0.0, 0.5]]
     np.testing.assert_allclose(stiffness_matrix(mesh).toarray(), expected, atol=1e-15)

@@ -7,7 +7,7 @@ from wks_segment.core import stiffness_matrix
 from wks_segment.core.spectral.multifrontal import NestedDissectionFactor, SingularError
 
 MESHES = [icosphere(4), grid(40, 30), creature(0.5, 4), together(icosphere(2), grid(9, 9)), icosphere(1)]
-IDS = ["sphere", "rectangle", "creature", "two parts", "smaller than a leaf"]
+IDS = ["sphere", "rectangle", "creature", "two islands", "smaller than a leaf"]
 
 
 def shifted(mesh, shift):
@@ -16,7 +16,7 @@ def shifted(mesh, shift):
 
 @pytest.mark.parametrize("mesh", MESHES, ids=IDS)
 @pytest.mark.parametrize(("dtype", "tolerance"), [(np.float64, 1e-11), (np.float32, 1e-3)])
-def test_it_solves(mesh, dtype, tolerance):
+def test_solutions_of_a_positive_definite_matrix(mesh, dtype, tolerance):
     matrix = shifted(mesh, 100.0)
     right = np.random.default_rng(0).standard_normal((mesh.n_vertices, 7))
     solution = NestedDissectionFactor(matrix, mesh.vertices, dtype).solve(right)
@@ -39,12 +39,12 @@ def test_a_positive_definite_matrix_has_no_negative_eigenvalue():
     assert NestedDissectionFactor(shifted(mesh, 100.0), mesh.vertices).n_negative == 0
 
 
-def test_a_singular_matrix_is_refused():
+def test_a_singular_matrix_is_an_error():
     with pytest.raises(SingularError, match="no inverse"):
         NestedDissectionFactor(csr_matrix((5, 5)), np.zeros((5, 3)))
 
 
-def test_points_at_one_place_do_not_matter():
+def test_unknowns_may_all_have_the_same_position():
     mesh = icosphere(3)
     matrix = shifted(mesh, 100.0)
     solution = NestedDissectionFactor(matrix, np.zeros((mesh.n_vertices, 3)), np.float64).solve(np.eye(mesh.n_vertices))

@@ -34,7 +34,7 @@ def test_wks_is_the_papers_formula():
     )
 
 
-def test_hks_is_the_heat_that_stays():
+def test_hks_is_the_heat_that_remains_at_a_vertex():
     mesh = grid(4, 3, 2.0)
     values, functions = eigenpairs(mesh, mesh.n_vertices)
     times = [0.01, 0.1]
@@ -63,7 +63,7 @@ def test_fast_pairs_give_nearly_the_same_signature():
         assert np.linalg.norm(fast - reference) < 0.007 * np.linalg.norm(reference)
 
 
-def test_fast_pairs_stand_very_thin_triangles():
+def test_fast_pairs_of_very_thin_triangles_give_nearly_the_same_signature():
     mesh = creature(0.3)
     vertices = mesh.vertices.copy()
     ends = mesh.faces[::40, :2]
@@ -89,14 +89,14 @@ def test_the_order_of_vertices_changes_nothing():
     np.testing.assert_allclose(wave_kernel_signature(*exact(shuffled, 60)), signature[order], rtol=1e-6)
 
 
-def test_a_pose_changes_little_and_another_part_much():
+def test_signatures_differ_less_between_poses_than_between_vertices():
     a, b = (wave_kernel_signature(*eigenpairs(creature(bend, 3), 60)) for bend in (0.0, 0.8))
     between_poses = np.abs(np.log(a) - np.log(b)).mean()
-    between_parts = np.abs(np.log(a) - np.log(np.roll(a, len(a) // 2, axis=0))).mean()
-    assert between_poses < between_parts / 3
+    between_vertices = np.abs(np.log(a) - np.log(np.roll(a, len(a) // 2, axis=0))).mean()
+    assert between_poses < between_vertices / 3
 
 
-def test_every_zero_mode_stays_out():
+def test_all_zero_modes_are_left_out():
     both = together(icosphere(2), TriangleMesh(icosphere(2).vertices + 5, icosphere(2).faces))
     signature = wave_kernel_signature(*eigenpairs(both, 32))
     assert np.isfinite(signature).all()
@@ -108,7 +108,7 @@ def test_blocks_of_rows_change_nothing(monkeypatch):
 
     pairs = exact(creature(0.1, 3), 40)
     whole = wave_kernel_signature(*pairs)
-    monkeypatch.setattr(module, "ROWS", 7)
+    monkeypatch.setattr(module, "SIGNATURE_ROWS", 7)
     np.testing.assert_allclose(wave_kernel_signature(*pairs), whole, rtol=1e-12)
 
 
@@ -121,6 +121,6 @@ def test_blocks_of_rows_change_nothing(monkeypatch):
         ([0.0, 3.0, 3.0], np.ones((5, 3)), "span no energies"),
     ],
 )
-def test_unfit_pairs_are_refused(values, functions, message):
+def test_unusable_pairs_are_an_error(values, functions, message):
     with pytest.raises(ValueError, match=message):
         wave_kernel_signature(values, functions)
