@@ -1,6 +1,6 @@
 """Meshes with the defects that occur in practice: a base shape, and functions that damage its vertices and faces.
 
-`any_mesh` is a hypothesis strategy of (vertices, faces, names of the defects); `DEFECTS` lists the defects that it draws.
+`any_mesh` is a hypothesis strategy of (vertices, faces, names of the defects); it draws from `DEFECTS`.
 """
 
 import numpy as np
@@ -166,8 +166,9 @@ DEFECTS = {
     defect.__name__: defect
     for defect in (
         open_border, duplicate_faces, two_sided, mixed_orientation, edges_of_three_faces, faces_without_area,
-        faces_on_a_line, isolated_vertices, unwelded, half_welded, small_islands, inside_each_other, glued, noise, spikes,
-        flat, needle, tiny, huge, far_from_the_origin, all_at_one_place, not_finite, beyond_single_precision,
+        faces_on_a_line, isolated_vertices, unwelded, half_welded, small_islands, inside_each_other, glued, noise,
+        spikes, flat, needle, tiny, huge, far_from_the_origin, all_at_one_place, not_finite,
+        beyond_single_precision,
     )
 }  # fmt: skip
 

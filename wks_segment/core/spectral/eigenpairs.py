@@ -107,7 +107,7 @@ def eigenpair_panels(
 ) -> tuple[FloatArray, IntArray, Panels]:
     """The same as `eigenpairs`, the functions in panels of columns, so that they are not all in memory at once.
 
-    The panels are computed while they are read: call and reader limit BLAS to one thread.
+    The panels are computed while they are read, so whoever reads them should limit BLAS to one thread.
 
     Returns
     -------

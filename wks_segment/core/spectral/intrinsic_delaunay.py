@@ -25,7 +25,7 @@ WEIGHT_TOLERANCE = 1e-9
 LEAST_SLACK = 1e-8
 """Least difference between two sides of a triangle and the third one, in mean edges, so that degenerate triangles can
 be laid out flat (Sharp and Crane, "A Laplacian for nonmanifold triangle meshes" (2020), section 4.5). Their value of
-1e-5 would widen a triangle to a two-hundredth of its length."""
+1e-5 would already change a triangle that is two hundred times as long as wide."""
 MAX_FLIP_ROUNDS = 500
 """Most rounds of flips. A dozen is usual, and after each of them the triangulation is valid."""
 
