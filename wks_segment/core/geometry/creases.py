@@ -34,9 +34,10 @@ MOST_BALLS = 20_000
 BALLS_AT_ONCE = 2_000
 """Balls between two reports of progress."""
 BORDER_CREASE, MOST_CONCAVE, MOST_CONVEX = 0.4, 15.0, 2.0
-"""A border is weighted by `exp(BORDER_CREASE * clip(curvature, -MOST_CONCAVE, MOST_CONVEX))`: less in creases …"""
+"""A border is weighted by `exp(BORDER_CREASE * clip(curvature, -MOST_CONCAVE, MOST_CONVEX))`, less in creases …"""
 BORDER_STEP, MOST_STEP = 0.1, 40.0
-"""… and by `exp(-BORDER_STEP * min(step, MOST_STEP))`, with `step` the change of log thickness per unit of length."""
+"""… and by `exp(-BORDER_STEP * min(step, MOST_STEP))`, with `step` the change of log thickness per unit of length.
+Merging components with both weights labels unseen poses and bodies better (docs/dev/experiments.md)."""
 LEAST_DISTANCE = 3e-3
 """Least distance between faces for that change: on tiny faces it would be noise."""
 LEAST_THICKNESS = 0.003

@@ -18,12 +18,13 @@ from .agglomeration import gains_of_joining, join_in_table
 from .creases import MOST_CONCAVE
 
 PATCHES = 250
-"""Number of patches that a surface is divided into first."""
+"""Number of patches that a surface is divided into first; tables of pairs of patches grow with its square."""
 PATCH_CREASE = 0.3
 """Extra length of a path across a crease, in units of its curvature, so that patches end at creases."""
 LEAST_GAINS = (7.0, 10.0, 14.0)
 """Least decrease of the sum of border length by area for which two parts are joined, on a surface of area 1: one cut
-for each value, since people cut coarser or finer than any single one of them."""
+for each value. Choosing mixtures by three cuts instead of one at 10 lowers their Rand-index error from 0.154 to 0.148
+("Which mixture?" in docs/dev/experiments.md)."""
 
 
 def human_like_parts(

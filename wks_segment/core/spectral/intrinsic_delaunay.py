@@ -19,7 +19,7 @@ Laplacian = Literal["cotangent", "delaunay"]
 
 SLIVER_SHARE = 0.08
 """Negative share of the total edge weight above which a mesh counts as full of slivers; ordinary meshes have half of
-it."""
+it. Without slivers the flips gain nothing ("Which Laplacian" in docs/reliability.md)."""
 WEIGHT_TOLERANCE = 1e-9
 """Magnitude of a negative edge weight that needs no flip."""
 LEAST_SLACK = 1e-8
