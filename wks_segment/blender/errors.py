@@ -23,8 +23,8 @@ class TooLargeError(UserError):
 
 
 class ChangedError(UserError):
-    """What was read has changed meanwhile; the message says how."""
+    """The scene has changed since it was read; the message says how."""
 
 
 class EndedError(UserError):
-    """A job was canceled before it was done; the message says why."""
+    """A job was ended before it was complete; the message says why."""

@@ -35,14 +35,16 @@ from .operators.split_segment import WKS_SEGMENT_OT_split_segment
 from .operators.transfer import WKS_SEGMENT_OT_transfer
 from .operators.unwrap import WKS_SEGMENT_OT_unwrap
 from .operators.update import WKS_SEGMENT_OT_update
-from .props import preferences, presets
+from .props import changes, preferences, presets
 from .props.model_item import WKSModelItem, WKSRankItem
 from .props.segment_item import WKSSegmentItem
 from .props.settings import WKSSegmentSettings
 from .ui import main_panel, menu, models_panel, segments_panel
+from .ui.preview import ViewportPreview
 from .ui.translations import TRANSLATIONS
-from .workflow import live_session
-from .workflow.background_job import HOLDER, Desk
+from .workflow.background_job import JOB_HOLDER, JobHolder
+from .workflow.live_session import SESSION, Session
+from .workflow.property_changes import PropertyChanges
 
 OPERATORS = (
     WKS_SEGMENT_OT_learn,
@@ -86,28 +88,30 @@ CLASSES = (
     *OPERATORS,
     *menu.CLASSES,
     *presets.CLASSES,
-    # Sub-panels stand in the order of their registration.
+    # Blender shows sub-panels in the order of their registration.
     main_panel.CLASSES[0],
     *segments_panel.CLASSES,
     *models_panel.CLASSES,
     *main_panel.CLASSES[1:],
 )
-COMMAND = "wks_segment"
+COMMAND_NAME = "wks_segment"
+"""Name of the command: `blender --command wks_segment`."""
 
 _commands: list[Any] = []
-"""Handles of the command line, which Blender wants back on unregistering."""
+"""Handles of the registered command, which Blender needs to unregister it."""
 
 
 def register() -> None:
     """Called by Blender when the extension is enabled."""
+    changes.connect(PropertyChanges())
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.Scene.wks_segment = bpy.props.PointerProperty(type=WKSSegmentSettings)
-    setattr(bpy.types.WindowManager, HOLDER, Desk())
-    setattr(bpy.types.WindowManager, live_session.HOLDER, live_session.Session())
+    setattr(bpy.types.WindowManager, JOB_HOLDER, JobHolder())
+    setattr(bpy.types.WindowManager, SESSION, Session(ViewportPreview()))
     bpy.app.translations.register(__name__, TRANSLATIONS)
     bpy.types.VIEW3D_MT_object.append(menu.draw_in_object_menu)
-    _commands.append(bpy.utils.register_cli_command(COMMAND, run))
+    _commands.append(bpy.utils.register_cli_command(COMMAND_NAME, run))
 
 
 def unregister() -> None:
@@ -115,9 +119,10 @@ def unregister() -> None:
     bpy.utils.unregister_cli_command(_commands.pop())
     bpy.types.VIEW3D_MT_object.remove(menu.draw_in_object_menu)
     bpy.app.translations.unregister(__name__)
-    for holder in (live_session.HOLDER, HOLDER):
-        getattr(bpy.types.WindowManager, holder).close()
-        delattr(bpy.types.WindowManager, holder)
+    for name in (SESSION, JOB_HOLDER):
+        getattr(bpy.types.WindowManager, name).close()
+        delattr(bpy.types.WindowManager, name)
     del bpy.types.Scene.wks_segment
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
+    changes.disconnect()

@@ -16,8 +16,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TypeVar
 
+from .message import Message
+
 T = TypeVar("T")
-Report = Callable[[str, float], None]
+ReportFunction = Callable[[str, float], None]
 """Called with the name of a stage and the share of the whole work that is done, 0 to 1. An error that it raises ends
 the work: this is how a job is canceled."""
 
@@ -35,14 +37,15 @@ class Progress:
         Where this work begins and ends within the whole.
     """
 
-    def __init__(self, report: Report | None = None, stage: str = "", start: float = 0.0, end: float = 1.0) -> None:
+    def __init__(self, report: ReportFunction | None = None, stage: str = "", start: float = 0.0, end: float = 1.0) -> None:
         self.stage = stage
+        self._titles: tuple[tuple[str, dict[str, object]], ...] = ()
         self._report = report
         self._start, self._end = start, end
         self._begun = 0.0
 
     @classmethod
-    def of(cls, report: Report | Progress | None, stage: str = "") -> Progress:
+    def of(cls, report: ReportFunction | Progress | None, stage: str = "") -> Progress:
         """Progress that is reported to a function of stage and share; a `Progress` stays as it is."""
         return report if isinstance(report, Progress) else cls(report, stage)
 
@@ -56,7 +59,23 @@ class Progress:
     def __call__(self, share: float, stage: str | None = None) -> None:
         """Report that a share of this work is done, 0 to 1; raises what the caller's function raises."""
         if self._report is not None:
-            self._report(self.stage if stage is None else stage, self._start + share * (self._end - self._start))
+            name = self.stage if stage is None else stage
+            for template, values in self._titles:
+                name = Message(template, stage=name, **values)
+            self._report(name, self._start + share * (self._end - self._start))
+
+    def report(self, stage: str, share: float) -> None:
+        """The same as a function of stage and share, for work that asks for one."""
+        self(share, stage)
+
+    def titled(self, template: str, **values: object) -> Progress:
+        """This work with the name of each of its stages put into a template for a message: "Signature of {stage}".
+
+        A template without that field is the one name of all stages.
+        """
+        title = self.part(0.0, 1.0)
+        title._titles = ((template, values), *self._titles)
+        return title
 
     def never_falling(self) -> Progress:
         """The same progress, except that a lower share than before is reported as the highest one so far.
@@ -71,7 +90,9 @@ class Progress:
         """The part of this work between two shares of it, under the name of another stage if one is given."""
         length = self._end - self._start
         name = self.stage if stage is None else stage
-        return Progress(self._report, name, self._start + start * length, self._start + end * length)
+        part = Progress(self._report, name, self._start + start * length, self._start + end * length)
+        part._titles = self._titles
+        return part
 
     @contextmanager
     def step(self, share: float, stage: str | None = None) -> Iterator[Progress]:

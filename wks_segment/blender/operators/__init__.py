@@ -1,1 +1,1 @@
-"""The operators: one file for each button or menu entry, or for a few that belong together."""
+"""The operators, one file each. `_base` is what they share, `_report` what they tell the user."""

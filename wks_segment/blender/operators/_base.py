@@ -1,71 +1,109 @@
-"""How operators run their work: in a thread while the window lives on, or at once for a script."""
+"""Base classes of the operators: what they need, how errors are reported, and how jobs run.
+
+A job runs in a thread while the window stays responsive, or at once if a script calls the operator.
+"""
 
 from __future__ import annotations
 
-from typing import Generic, Protocol, TypeVar
+from typing import ClassVar, Generic, Protocol, TypeVar
 
 import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ...core import PoseSegmentation
-from ...core.poses.describe import Progress
+from ...core.message import Message, message_of
+from ...core.progress import Progress
 from ..errors import ChangedError, EndedError, TooLargeError, UserError
-from ..props.settings import WKSSegmentSettings
+from ..props.settings import LABEL_SETTINGS, WKSSegmentSettings
 from ..scene.change_guard import Watch
 from ..scene.poses import Pose
 from ..ui.messages import in_panel
 from ..workflow import pipeline
-from ..workflow.background_job import Job, desk_of, redraw
+from ..workflow.background_job import Job, job_holder, redraw_sidebars
 from ..workflow.live_session import session_of
-from ..workflow.segmentation_job import Work
+from ..workflow.segmentation_job import SegmentationJob
 from . import _report
-from ._tunable import Tunable
+from ._needs import Need
 
-WRITABLE = ("OBJECT", "POSE")
-"""Modes in which Blender's undo takes note of meshes."""
+WRITABLE_MODES = ("OBJECT", "POSE")
+"""Modes in which Blender's undo records changes of meshes."""
+SKIP_SAVE = {"options": {"SKIP_SAVE"}}
 
 
-class Computes(Protocol):
-    """Work that is read, computed without Blender, and written."""
+class BaseOperator:
+    """An operator that needs some things, and reports a UserError that ends it."""
+
+    needs: ClassVar[tuple[Need, ...]] = ()
+    """What is needed before the operator can run; the first missing one is the tooltip of the gray button."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether all needs are met; explains the first that is not."""
+        for need in cls.needs:
+            missing = need(context)
+            if missing is not None:
+                _report.explain(cls, missing)  # type: ignore[arg-type]  # mixed in to an operator
+                return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Called by Blender."""
+        try:
+            return self.run(context)
+        except UserError as error:
+            return self.refused(error)
+
+    def run(self, context: bpy.types.Context) -> set[str]:
+        """Do what the operator is for; may raise UserError."""
+        raise NotImplementedError
+
+    def refused(self, error: Exception) -> set[str]:
+        """Report an error, and cancel."""
+        _report.tell(self, {"ERROR"}, message_of(error))
+        return {"CANCELLED"}
+
+
+class ComputedJob(Protocol):
+    """What an operator computes in a thread, between reading from Blender and writing to it."""
 
     poses: list[Pose]
-    watch: Watch
+    guard: Watch
 
     @property
     def model(self) -> PoseSegmentation:
-        """By which the poses are described."""
+        """The model that describes the poses, for the limits of time and memory."""
 
     def compute(self, progress: Progress) -> None:
-        """The part for a thread."""
+        """Compute without Blender."""
 
 
-W = TypeVar("W", bound=Computes)
+J = TypeVar("J", bound=ComputedJob)
 
 
-class RunsJob(Generic[W]):
-    """An operator that runs work of some kind; it asks before a job above the user's limits, and without a window
-    refuses it."""
+class JobOperator(BaseOperator, Generic[J]):
+    """An operator that runs a job. It asks before a job above the user's limits, and refuses it without a window."""
 
-    confirmed: bpy.props.BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
+    confirmed: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
 
     bl_label: str
     job: Job
-    work: W
+    computed: J
     asked = False
-    """Whether the next call of `execute` is the answer to a question in the window."""
+    """Whether the next call of `execute` is the answer to the question about a large job."""
 
-    def read(self, context: bpy.types.Context) -> W:
-        """Read what the work needs; UserError if it cannot be used."""
+    def read(self, context: bpy.types.Context) -> J:
+        """Read everything that the job needs; UserError if it cannot be used."""
         raise NotImplementedError
 
     def written(self, context: bpy.types.Context) -> set[str]:
-        """Write what was computed and report."""
+        """Write the computed result and report it."""
         raise NotImplementedError
 
     def take(self, settings: WKSSegmentSettings) -> None:
-        """Hand what the operator was given to the scene."""
+        """Hand properties of the operator to the scene's settings."""
 
-    def again(self, context: bpy.types.Context) -> W | None:
-        """Of what is adjusted, the work with other settings; None where there is nothing to begin with."""
+    def adjusted(self, context: bpy.types.Context) -> J | None:
+        """The last job with the adjusted settings, if the operator is called by Adjust Last Operation."""
         return None
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -78,40 +116,38 @@ class RunsJob(Generic[W]):
         except TooLargeError as error:
             self.confirmed = self.asked = True
             return context.window_manager.invoke_confirm(
-                self, event, title=in_panel("Large Job"), message=in_panel(str(error)), confirm_text=in_panel("Go On")
-            )
+                self, event, title=in_panel("Large Job"), message=in_panel(message_of(error)),
+                confirm_text=in_panel("Go On"),
+            )  # fmt: skip
         except UserError as error:
             return self.refused(error)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        """Called by a script, by a redo, or after the question."""
+    def run(self, context: bpy.types.Context) -> set[str]:
+        """Called by a script, by Adjust Last Operation, or after the question about a large job."""
         self.take(context.scene.wks_segment)
-        try:
-            if self.asked:
-                self.asked = False
-                return self.started(context)
-            self.work = self.again(context) or self.checked(context)
-            with _report.cursor_progress(context) as progress:
-                self.work.compute(progress)
-            return self.written(context)
-        except UserError as error:
-            return self.refused(error)
+        if self.asked:
+            self.asked = False
+            return self.started(context)
+        self.computed = self.adjusted(context) or self.checked(context)
+        with _report.cursor_progress(context) as progress:
+            self.computed.compute(progress)
+        return self.written(context)
 
     def started(self, context: bpy.types.Context) -> set[str]:
-        """Read, and let a thread compute; UserError if it cannot be done."""
+        """Read, and start to compute in a thread; UserError if that is not possible."""
         self.begin(context)
-        desk_of(context).tick(context)
+        job_holder(context).start_timer(context)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def begin(self, context: bpy.types.Context) -> None:
-        """Read, and lay the job on the desk."""
-        self.work = self.checked(context)
-        self.job = desk_of(context).start(self.bl_label, self.work.compute, self.work.watch.glance)
+        """Read, and start the thread."""
+        self.computed = self.checked(context)
+        self.job = job_holder(context).start(self.bl_label, self.computed.compute, self.computed.guard.glance)
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Called for all that happens in the window: leave it to others, but for ESC and the timer."""
-        if desk_of(context).job is not self.job:  # it broke off, and Blender calls on
+        """Called for every event in the window; all but ESC and the timer are passed on."""
+        if job_holder(context).job is not self.job:  # an error has ended it, and Blender still calls
             return {"CANCELLED"}
         if event.type == "ESC" and event.value == "PRESS" and not self.job.ending:
             self.job.end()
@@ -119,69 +155,80 @@ class RunsJob(Generic[W]):
         return self.step(context) if event.type == "TIMER" else {"PASS_THROUGH"}
 
     def step(self, context: bpy.types.Context) -> set[str]:
-        """Look at the job; when it is over, write."""
-        redraw(context)
+        """Look after the job, and write the result when it is complete."""
+        redraw_sidebars(context)
         if not self.job.step():
             return {"PASS_THROUGH"}
-        if context.mode not in WRITABLE and self.job.succeeded:
+        if context.mode not in WRITABLE_MODES and self.job.succeeded:
             self.job.stage = "Done, to be written in Object Mode"
             return {"PASS_THROUGH"}
-        said = ""
+        message = ""
         try:
             self.job.result()
             return self.written(context)
         except (ChangedError, EndedError) as error:
-            self.job.end(str(error))
-            said = self.job.epitaph
-            _report.tell(self, {"WARNING"}, said)
+            self.job.end(message_of(error))
+            message = self.job.end_message
+            _report.tell(self, {"WARNING"}, message)
             return {"CANCELLED"}
         except UserError as error:
             return self.refused(error)
         finally:
-            desk_of(context).clear(said)
+            job_holder(context).release(message)
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """Called by Blender when it takes the window away."""
-        self.job.end("its window was closed")
-        desk_of(context).clear(self.job.epitaph)
+        """Called by Blender when the window is closed."""
+        self.job.end(Message("its window was closed"))
+        job_holder(context).release(self.job.end_message)
 
-    def checked(self, context: bpy.types.Context) -> W:
-        """What was read; TooLargeError unless it is within the limits or the user has agreed."""
-        work = self.read(context)
+    def checked(self, context: bpy.types.Context) -> J:
+        """The job as read; TooLargeError if it is above the limits and the user has not agreed."""
+        computed = self.read(context)
         if not self.confirmed:
-            pipeline.check_limits(work.model, work.poses, context.scene.wks_segment)
-        return work
-
-    def refused(self, error: UserError) -> set[str]:
-        """Tell why."""
-        _report.tell(self, {"ERROR"}, str(error))
-        return {"CANCELLED"}
+            pipeline.check_limits(computed.model, computed.poses, context.scene.wks_segment)
+        return computed
 
 
-class RunsWork(Tunable, RunsJob[Work]):
-    """An operator that runs a `Work`: it labels, and shows the settings that labels follow."""
+class LabelOperator(JobOperator[SegmentationJob]):
+    """An operator that labels meshes. It shows the settings that labels follow in Adjust Last Operation.
+
+    A setting that the caller gives goes to the scene; the others are taken from there.
+    """
+
+    n_segments: IntProperty(**LABEL_SETTINGS["n_segments"], **SKIP_SAVE)
+    auto_segments: BoolProperty(**LABEL_SETTINGS["auto_segments"], **SKIP_SAVE)
+    sides: EnumProperty(**LABEL_SETTINGS["sides"], **SKIP_SAVE)
+    smoothness: FloatProperty(**LABEL_SETTINGS["smoothness"], **SKIP_SAVE)
+    min_share: FloatProperty(**LABEL_SETTINGS["min_share"], **SKIP_SAVE)
 
     learns = False
-    """Whether its work is learning."""
+    """Whether the job learns a model."""
     verb = ""
-    """What it has done, for the status bar."""
+    """What was done, for the status bar."""
+
+    def take(self, settings: WKSSegmentSettings) -> None:
+        """Hand given properties to the scene's settings, and take the others from there."""
+        for name in LABEL_SETTINGS:
+            if self.properties.is_property_set(name):  # type: ignore[attr-defined]  # an operator's own
+                setattr(settings, name, getattr(self, name))
+            else:
+                setattr(self, name, getattr(settings, name))
 
     @property
     def is_adjusted(self) -> bool:
-        """Whether it was undone to be done with other settings, in the panel Adjust Last Operation."""
+        """Whether Adjust Last Operation has undone the operator and runs it again with other settings."""
         return bool(self.options.is_repeat)  # type: ignore[attr-defined]  # an operator's own
 
-    def again(self, context: bpy.types.Context) -> Work | None:
-        """Of what is adjusted, the work with other settings; None where there is nothing to begin with."""
-        before = session_of(context).work
-        if not self.is_adjusted or before is None or before.learns != self.learns:
+    def adjusted(self, context: bpy.types.Context) -> SegmentationJob | None:
+        """The last job with the adjusted settings; None if there is none of this kind."""
+        last = session_of(context).job
+        if not self.is_adjusted or last is None or last.learns != self.learns:
             return None
-        return before.again(context.scene.wks_segment)
+        return last.with_settings(context.scene.wks_segment)
 
     def written(self, context: bpy.types.Context) -> set[str]:
-        """Write what was computed and report."""
-        self.work.write()
-        session_of(context).keep(self.work, self.work.watch.scene())
-        if self.work.wanted.colors:
+        """Write the labels and report them."""
+        session_of(context).write(self.computed)
+        if self.computed.request.colors:
             _report.show_colors(context)
-        return _report.finish(self, self.verb, self.work.report)
+        return _report.finish(self, self.verb, self.computed.report)

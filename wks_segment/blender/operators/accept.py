@@ -4,32 +4,22 @@ from __future__ import annotations
 
 import bpy
 
-from ..errors import UserError
 from ..workflow.live_session import session_of
-from . import _report
+from . import _needs, _report
+from ._base import BaseOperator
 
 
-class WKS_SEGMENT_OT_accept(bpy.types.Operator):
-    """Write the segments that are shown"""
+class WKS_SEGMENT_OT_accept(BaseOperator, bpy.types.Operator):
+    """Write the previewed segments"""
 
     bl_idname = "wks_segment.accept"
     bl_label = "Accept"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return (
-            _report.shows_preview(cls, context)
-            and _report.no_job_runs(cls, context)
-            and _report.in_object_mode(cls, context)
-        )
+    needs = (_needs.preview, _needs.no_job, _needs.object_mode)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        try:
-            work = session_of(context).update(context.scene)
-        except UserError as error:
-            _report.tell(self, {"ERROR"}, str(error))
-            return {"CANCELLED"}
-        if work.wanted.colors:
+    def run(self, context: bpy.types.Context) -> set[str]:
+        job = session_of(context).update(context.scene)
+        if job.request.colors:
             _report.show_colors(context)
-        return _report.finish(self, "Accepted", work.report)
+        return _report.finish(self, "Accepted", job.report)

@@ -4,31 +4,22 @@ from __future__ import annotations
 
 import bpy
 
-from ..workflow.segmentation_job import Work
-from . import _report
-from ._base import RunsWork
+from ..workflow.live_session import session_of
+from ..workflow.segmentation_job import SegmentationJob
+from . import _needs
+from ._base import LabelOperator
 
 
-class WKS_SEGMENT_OT_apply(RunsWork, bpy.types.Operator):
-    """Find the learned parts in the selected objects as they are now: other poses, levels of detail or characters"""
+class WKS_SEGMENT_OT_apply(LabelOperator, bpy.types.Operator):
+    """Find the segments of the model in the selected objects: other poses, levels of detail or characters"""
 
     bl_idname = "wks_segment.apply"
     bl_label = "Apply to Selected"
     bl_options = {"REGISTER", "UNDO"}
 
+    needs = (_needs.model, _needs.no_job, _needs.object_mode, _needs.selected_mesh)
     verb = "Applied"
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not context.scene.wks_segment.model:
-            _report.explain(cls, "No model yet: use Learn and Segment, or import a model")
-            return False
-        return (
-            _report.no_job_runs(cls, context)
-            and _report.in_object_mode(cls, context)
-            and _report.has_selected_mesh(cls, context)
-        )
-
-    def read(self, context: bpy.types.Context) -> Work:
-        """Read the selected objects, the model and settings."""
-        return Work.applying(context)
+    def read(self, context: bpy.types.Context) -> SegmentationJob:
+        """Read the selected objects, the model and the settings."""
+        return SegmentationJob.applying(context, session_of(context).cache)

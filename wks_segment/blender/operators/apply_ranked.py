@@ -7,56 +7,60 @@ from pathlib import Path
 import bpy
 from bpy.props import IntProperty
 
+from ...core.message import Message
 from ..errors import UserError
 from ..workflow import model_library
+from ..workflow.live_session import session_of
 from ..workflow.model_ranking import ranked_objects
-from ..workflow.segmentation_job import Work
-from . import _report
-from ._base import RunsWork
+from ..workflow.segmentation_job import SegmentationJob
+from . import _needs
+from ._base import LabelOperator
 
 
-class WKS_SEGMENT_OT_apply_ranked(RunsWork, bpy.types.Operator):
-    """Use a model of the ranking, with its names and colors, and apply it to the character that was ranked"""
+def _ranking(context: bpy.types.Context) -> Message | None:
+    """A ranking in this scene."""
+    return None if context.scene.wks_segment.ranking else Message("No ranking yet: use Rank Models")
+
+
+class WKS_SEGMENT_OT_apply_ranked(LabelOperator, bpy.types.Operator):
+    """Apply a model of the ranking, with its names and colors, to the ranked character"""
 
     bl_idname = "wks_segment.apply_ranked"
     bl_label = "Apply Ranked Model"
     bl_options = {"REGISTER", "UNDO"}
 
+    needs = (_ranking, _needs.no_job, _needs.object_mode)
     verb = "Applied"
     index: IntProperty(
-        name="Rank", description="Which model of the ranking, 0 is the best", min=0, options={"SKIP_SAVE"}
+        name="Rank", description="Place of the model in the ranking, 0 for the best", min=0, options={"SKIP_SAVE"}
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not context.scene.wks_segment.ranking:
-            _report.explain(cls, "No ranking yet: use Rank Models")
-            return False
-        return _report.no_job_runs(cls, context) and _report.in_object_mode(cls, context)
-
-    def read(self, context: bpy.types.Context) -> Work:
-        """Read the character, the model and settings."""
+    def read(self, context: bpy.types.Context) -> SegmentationJob:
+        """Read the character, the model and the settings."""
         settings = context.scene.wks_segment
         if self.index >= len(settings.ranking):
-            raise UserError(f"The ranking has only {len(settings.ranking)} models")
+            raise UserError("The ranking has only {count} models", count=len(settings.ranking))
         item = settings.ranking[self.index]
-        texts = dict(model_library.all_of(settings))
-        if not item.path and item.name not in texts:
-            raise UserError(f'There is no model named "{item.name}" any more: rank anew')
-        model = model_library.loaded(Path(item.path)) if item.path else model_library.from_text(texts[item.name])
-        return Work.applying(context, model, ranked_objects(context))
+        if item.path:
+            model = model_library.loaded(Path(item.path))
+        else:
+            texts = dict(model_library.all_of(settings))
+            if item.name not in texts:
+                raise UserError('The model "{name}" is gone: rank the models again', name=item.name)
+            model = model_library.from_text(texts[item.name])
+        return SegmentationJob.applying(context, session_of(context).cache, model, ranked_objects(context))
 
     def written(self, context: bpy.types.Context) -> set[str]:
-        """Use the model, write what was computed and report."""
-        self.work.watch.look()  # before anything is changed
-        settings = self.work.watch.scene().wks_segment
+        """Use the model, write the labels and report them."""
+        self.computed.guard.look()  # before anything is changed
+        settings = self.computed.guard.scene().wks_segment
         item = settings.ranking[self.index]
         if not item.path:
             model_library.use(settings, settings.models.find(item.name))
         else:
-            path = Path(item.path)
-            summary = [f"From {path.name}", f"{self.work.model.n_segments_} segments"]
-            model_library.add(settings, self.work.model, item.name, summary)
-            # It is in the scene from now on.
+            model, file = self.computed.model, Path(item.path).name
+            summary = [Message("From {names}", names=file), Message("{count} segments", count=model.n_segments_)]
+            model_library.add(settings, model, item.name, summary)
+            # The model is in the scene now, under a name that may have got a number.
             item.name, item.path = settings.models[settings.used_model].name, ""
         return super().written(context)

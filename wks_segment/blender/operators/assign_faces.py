@@ -1,4 +1,4 @@
-"""Assign, New Segment and Forget: what the selected faces are, by hand."""
+"""Assign, New Segment and Forget: the segment of selected faces, by hand."""
 
 from __future__ import annotations
 
@@ -6,94 +6,91 @@ import bpy
 import numpy as np
 from bpy.props import StringProperty
 
+from ...core.message import Message
 from ..outputs.overrides import by_hand, keep_by_hand
 from ..scene.attributes import read_bools
 from ..workflow import segment_list
-from . import _report
+from . import _needs, _report
+from ._base import BaseOperator
 
 
-class WKS_SEGMENT_OT_assign_faces(bpy.types.Operator):
-    """Let the selected faces be of the active segment, also when the model is applied again"""
+def _faces_by_hand(context: bpy.types.Context) -> Message | None:
+    """A face whose segment was assigned by hand."""
+    return None if context.scene.wks_segment.faces_by_hand else Message("No face was assigned by hand")
+
+
+class WKS_SEGMENT_OT_assign_faces(BaseOperator, bpy.types.Operator):
+    """Assign the selected faces to the active segment, also when the model is applied again"""
 
     bl_idname = "wks_segment.assign_faces"
     bl_label = "Assign Faces to Segment"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _report.has_segments(cls, context, "EDIT_MESH")
+    needs = (_needs.edit_mode, _needs.active_segment)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         return _assign(self, context, segment_list.active_part(context.scene.wks_segment))
 
 
-class WKS_SEGMENT_OT_new_segment(bpy.types.Operator):
+class WKS_SEGMENT_OT_new_segment(BaseOperator, bpy.types.Operator):
     """Make a new segment of the selected faces"""
 
     bl_idname = "wks_segment.new_segment"
     bl_label = "New Segment from Faces"
     bl_options = {"REGISTER", "UNDO"}
 
+    needs = (_needs.edit_mode, _needs.active_segment)
+
     name: StringProperty(
-        name="Name", description="What the segment is called", default="New Segment", options={"SKIP_SAVE"}
+        name="Name", description="Name of the new segment", default="New Segment", options={"SKIP_SAVE"}
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _report.has_segments(cls, context, "EDIT_MESH")
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        return _assign(self, context, None)
+    def run(self, context: bpy.types.Context) -> set[str]:
+        return _assign(self, context, None, self.name)
 
 
-class WKS_SEGMENT_OT_forget_faces(bpy.types.Operator):
-    """Give the selected faces (in Object Mode: all) the segment that the model gives them, not that by hand"""
+class WKS_SEGMENT_OT_forget_faces(BaseOperator, bpy.types.Operator):
+    """Give the selected faces, or all faces in Object Mode, the segment of the model again"""
 
     bl_idname = "wks_segment.forget_faces"
     bl_label = "Forget Faces Assigned by Hand"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not _report.has_segments(cls, context):
-            return False
-        if not context.scene.wks_segment.faces_by_hand:
-            _report.explain(cls, "No face was assigned by hand")
-            return False
-        return True
+    needs = (_needs.object_or_edit_mode, _needs.active_segment, _faces_by_hand)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
-        chosen_only = context.mode == "EDIT_MESH"
+        selected_only = context.mode == "EDIT_MESH"
         objects, count = segment_list.labeled(settings), 0
         with segment_list.object_mode(context):
             for mesh in segment_list.meshes_of(objects):
-                given = by_hand(mesh)
-                forgotten = (given >= 0) & (read_bools(mesh.polygons, "select") | (not chosen_only))
+                parts = by_hand(mesh)
+                forgotten = (parts >= 0) & (read_bools(mesh.polygons, "select") | (not selected_only))
                 count += int(forgotten.sum())
-                keep_by_hand(mesh, np.where(forgotten, -1, given))
+                keep_by_hand(mesh, np.where(forgotten, -1, parts))
             segment_list.rewrite_all(settings, objects)
-        _report.tell(self, {"INFO"}, f"{count} faces are as the model has them")
+        _report.tell(self, {"INFO"}, Message("{count} faces have the segment of the model again", count=count))
         return {"FINISHED"}
 
 
-def _assign(operator: bpy.types.Operator, context: bpy.types.Context, part: int | None) -> set[str]:
-    """Give the selected faces to a part; None: to a new one."""
+def _assign(operator: bpy.types.Operator, context: bpy.types.Context, part: int | None, name: str = "") -> set[str]:
+    """Assign the selected faces to a part; without one to a new part with this name."""
     settings = context.scene.wks_segment
-    # Faces of objects that are not in Edit Mode can be selected too, unseen.
+    # Objects that are not in Edit Mode can have selected faces as well, which are not visible.
     objects = [obj for obj in segment_list.labeled(settings) if obj.mode == "EDIT"]
     with segment_list.object_mode(context):
-        chosen = {mesh: read_bools(mesh.polygons, "select") for mesh in segment_list.meshes_of(objects)}
-        count = sum(int(selected.sum()) for selected in chosen.values())
+        selected = {mesh: read_bools(mesh.polygons, "select") for mesh in segment_list.meshes_of(objects)}
+        count = sum(int(faces.sum()) for faces in selected.values())
         if count:
             if part is None:
-                part = segment_list.make_part(settings, operator.name)
-            for mesh, selected in chosen.items():
-                keep_by_hand(mesh, np.where(selected, part, by_hand(mesh)))
+                part = segment_list.make_part(settings, name)
+            for mesh, faces in selected.items():
+                keep_by_hand(mesh, np.where(faces, part, by_hand(mesh)))
             segment_list.rewrite_all(settings, objects)
             segment_list.activate(settings, part)
     if not count:
         _report.tell(operator, {"WARNING"}, "Select some faces of an object that has segments first")
         return {"CANCELLED"}
-    _report.tell(operator, {"INFO"}, f"{count} faces are of {settings.style().name_of(part)} now")
+    segment = settings.style().name_of(part)
+    _report.tell(operator, {"INFO"}, Message("Assigned {count} faces to {segment}", count=count, segment=segment))
     return {"FINISHED"}

@@ -4,26 +4,27 @@ from __future__ import annotations
 
 import bpy
 
-from ..workflow.background_job import desk_of
-from . import _report
+from ...core.message import Message
+from ..workflow.background_job import job_holder
+from ._base import BaseOperator
 
 
-class WKS_SEGMENT_OT_cancel(bpy.types.Operator):
-    """End the running job; nothing is written (ESC)"""
+def _running_job(context: bpy.types.Context) -> Message | None:
+    """A running job."""
+    return Message("No job is running") if job_holder(context).job is None else None
+
+
+class WKS_SEGMENT_OT_cancel(BaseOperator, bpy.types.Operator):
+    """End the running job without writing anything (ESC)"""
 
     bl_idname = "wks_segment.cancel"
     bl_label = "Cancel"
     bl_options = {"INTERNAL"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if desk_of(context).job is None:
-            _report.explain(cls, "No job is running")
-            return False
-        return True
+    needs = (_running_job,)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        job = desk_of(context).job
+    def run(self, context: bpy.types.Context) -> set[str]:
+        job = job_holder(context).job
         assert job is not None  # as polled
         job.end()
         return {"FINISHED"}

@@ -4,39 +4,43 @@ from __future__ import annotations
 
 import bpy
 
+from ...core.message import Message
 from ..outputs.labels import clear_labels, has_labels
 from ..outputs.separate import unite, whole_of
 from ..scene.characters import selected_meshes
 from ..workflow import segment_list
-from . import _report
+from . import _needs, _report
+from ._base import BaseOperator
 
 
-class WKS_SEGMENT_OT_clear(bpy.types.Operator):
-    """Remove what was written to the selected objects, and give back their own materials"""
+class WKS_SEGMENT_OT_clear(BaseOperator, bpy.types.Operator):
+    """Remove everything that was written to the selected objects, and restore their own materials"""
 
     bl_idname = "wks_segment.clear"
     bl_label = "Clear"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _report.in_object_mode(cls, context) and _report.has_labeled_mesh(cls, context)
+    needs = (_needs.object_mode, _needs.labeled_mesh)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        chosen = selected_meshes(context)
-        names = {obj.name for obj in chosen}
-        wholes = {whole for obj in chosen if (whole := whole_of(obj)) is not None}
-        kept = sum(unite(context, whole) for whole in wholes)
-        # Pieces are gone now, but for those that were worked on.
-        there = wholes | {obj for obj in context.scene.objects if obj.name in names}
-        meshes = {obj.data for obj in there if obj.data.library is None}
-        cleared = sum(clear_labels(mesh) for mesh in meshes)
+    def run(self, context: bpy.types.Context) -> set[str]:
+        selected = selected_meshes(context)
+        names = {obj.name for obj in selected}
+        wholes = {whole for obj in selected if (whole := whole_of(obj)) is not None}
+        n_kept = sum(unite(context, whole) for whole in wholes)
+        # Separated objects are removed by now, unless the user has changed them.
+        remaining = wholes | {obj for obj in context.scene.objects if obj.name in names}
+        meshes = {obj.data for obj in remaining if obj.data.library is None}
+        n_cleared = sum(clear_labels(mesh) for mesh in meshes)
         context.scene.wks_segment.applied = ""
         segment_list.fill(context.scene.wks_segment)
         if not any(has_labels(mesh) for mesh in bpy.data.meshes):
             _report.hide_colors(context)
-        of = "1 mesh" if cleared == 1 else f"{cleared} meshes"
-        _report.tell(self, {"INFO"}, f"Cleared the segments of {of}")
-        if kept:
-            _report.tell(self, {"WARNING"}, f"{kept} separated objects were worked on since, and stay")
+        if n_cleared == 1:
+            _report.tell(self, {"INFO"}, "Cleared the segments of 1 mesh")
+        else:
+            _report.tell(self, {"INFO"}, Message("Cleared the segments of {count} meshes", count=n_cleared))
+        if n_kept:
+            _report.tell(
+                self, {"WARNING"}, Message("{count} separated objects have changed since and are kept", count=n_kept)
+            )
         return {"FINISHED"}

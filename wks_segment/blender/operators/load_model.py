@@ -9,12 +9,15 @@ from bpy.props import StringProperty
 from bpy_extras.io_utils import ImportHelper
 
 from ...core import ModelFileError, PoseSegmentation
+from ...core.message import Message, message_of
+from ..errors import UserError
 from ..workflow import model_library
 from . import _report
+from ._base import BaseOperator
 
 
-class WKS_SEGMENT_OT_load_model(bpy.types.Operator, ImportHelper):
-    """Add a model from a file to those of this scene, and use it"""
+class WKS_SEGMENT_OT_load_model(BaseOperator, bpy.types.Operator, ImportHelper):
+    """Add a model from a file to the models of this scene, and use it"""
 
     bl_idname = "wks_segment.load_model"
     bl_label = "Import Model"
@@ -23,14 +26,16 @@ class WKS_SEGMENT_OT_load_model(bpy.types.Operator, ImportHelper):
     filename_ext = ".json"
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         path = Path(bpy.path.abspath(self.filepath))
         try:
             model = PoseSegmentation.load(path)
         except (ModelFileError, OSError) as error:
-            _report.tell(self, {"ERROR"}, f"{path.name} was not loaded: {error}")
-            return {"CANCELLED"}
-        summary = [f"From {path.name}", f"{model.n_segments_} segments"]
+            raise UserError("{file} was not loaded: {reason}", file=path.name, reason=message_of(error)) from error
+        count = model.n_segments_
+        summary = [Message("From {names}", names=path.name), Message("{count} segments", count=count)]
         model_library.add(context.scene.wks_segment, model, path.stem, summary)
-        _report.tell(self, {"INFO"}, f"Loaded a model of {model.n_segments_} segments from {path.name}")
+        _report.tell(
+            self, {"INFO"}, Message("Loaded a model of {count} segments from {file}", count=count, file=path.name)
+        )
         return {"FINISHED"}

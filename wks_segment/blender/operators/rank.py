@@ -4,38 +4,39 @@ from __future__ import annotations
 
 import bpy
 
+from ...core.message import Message
 from ..props.preferences import model_folder
-from ..workflow.model_ranking import RankWork
-from . import _report
-from ._base import RunsJob
+from ..workflow.live_session import session_of
+from ..workflow.model_ranking import RankingJob
+from . import _needs, _report
+from ._base import JobOperator
 
 
-class WKS_SEGMENT_OT_rank(RunsJob[RankWork], bpy.types.Operator):
-    """Say which models of this scene and of the model folder fit the active character, and how surely"""
+def _any_model(context: bpy.types.Context) -> Message | None:
+    """A model in this scene, or a model folder.
+
+    The folder itself is not searched, since this is called whenever the panel is drawn and the folder may be slow.
+    """
+    if context.scene.wks_segment.model or model_folder(context):
+        return None
+    return Message("No model yet: learn one, import one, or set Model Folder in the preferences")
+
+
+class WKS_SEGMENT_OT_rank(JobOperator[RankingJob], bpy.types.Operator):
+    """Rank the models of this scene and of the model folder by how well they fit the active character"""
 
     bl_idname = "wks_segment.rank"
     bl_label = "Rank Models"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        # Not what is in the folder: this is asked whenever the panel is drawn, and the folder may be far away.
-        if not (context.scene.wks_segment.model or model_folder(context)):
-            _report.explain(cls, "No model yet: learn one, import one, or set Model Folder in the preferences")
-            return False
-        return (
-            _report.no_job_runs(cls, context)
-            and _report.in_object_mode(cls, context)
-            and _report.has_selected_mesh(cls, context)
-        )
+    needs = (_any_model, _needs.no_job, _needs.object_mode, _needs.selected_mesh)
 
-    def read(self, context: bpy.types.Context) -> RankWork:
+    def read(self, context: bpy.types.Context) -> RankingJob:
         """Read the models and the active character."""
-        return RankWork.read(context)
+        return RankingJob.read(context, session_of(context).cache)
 
     def written(self, context: bpy.types.Context) -> set[str]:
-        """Show the ranking and report."""
-        _report.tell(self, {"INFO"}, self.work.write())
-        for warning in self.work.report.warnings:
-            _report.tell(self, {"WARNING"}, warning)
+        """Show the ranking and report the verdict."""
+        _report.tell(self, {"INFO"}, self.computed.write())
+        _report.tell_warnings(self, self.computed.report.warnings)
         return {"FINISHED"}

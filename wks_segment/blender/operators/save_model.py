@@ -8,28 +8,25 @@ import bpy
 from bpy.props import StringProperty
 from bpy_extras.io_utils import ExportHelper
 
+from ...core.message import Message, message_of
 from ..errors import UserError
 from ..workflow import pipeline
-from . import _report
+from . import _needs, _report
+from ._base import BaseOperator
 
 
-class WKS_SEGMENT_OT_save_model(bpy.types.Operator, ExportHelper):
+class WKS_SEGMENT_OT_save_model(BaseOperator, bpy.types.Operator, ExportHelper):
     """Save the active model to a file, with names and colors, for other scenes and for the command line"""
 
     bl_idname = "wks_segment.save_model"
     bl_label = "Export Model"
 
+    needs = (_needs.model,)
+
     filename_ext = ".json"
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not context.scene.wks_segment.model:
-            _report.explain(cls, "No model yet: use Learn and Segment, or import a model")
-            return False
-        return True
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         path = Path(bpy.path.abspath(self.filepath))
         path = path if path.suffix else path.with_suffix(self.filename_ext)
         try:
@@ -37,7 +34,6 @@ class WKS_SEGMENT_OT_save_model(bpy.types.Operator, ExportHelper):
             model.part_notes_ = context.scene.wks_segment.notes()
             model.save(path)
         except (UserError, ValueError, OSError) as error:
-            _report.tell(self, {"ERROR"}, f"The model was not saved: {error}")
-            return {"CANCELLED"}
-        _report.tell(self, {"INFO"}, f"Saved the model to {path}")
+            raise UserError("The model was not saved: {reason}", reason=message_of(error)) from error
+        _report.tell(self, {"INFO"}, Message("Saved the model to {path}", path=path))
         return {"FINISHED"}

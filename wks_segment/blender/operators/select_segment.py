@@ -6,36 +6,36 @@ import bmesh
 import bpy
 from bpy.props import BoolProperty
 
+from ...core.message import Message
 from ..outputs.ledger import note_of
 from ..workflow import segment_list
-from . import _report
+from . import _needs, _report
+from ._base import BaseOperator
 
 
-class WKS_SEGMENT_OT_select_segment(bpy.types.Operator):
-    """Select the faces of the active segment, in Edit Mode. Shift: beside those that are selected"""
+class WKS_SEGMENT_OT_select_segment(BaseOperator, bpy.types.Operator):
+    """Select the faces of the active segment in Edit Mode, with Shift in addition to the selection"""
 
     bl_idname = "wks_segment.select_segment"
     bl_label = "Select Segment"
     bl_options = {"REGISTER", "UNDO"}
 
-    extend: BoolProperty(name="Extend", description="Keep what is selected")
+    needs = (_needs.object_or_edit_mode, _needs.active_segment)
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _report.has_segments(cls, context)
+    extend: BoolProperty(name="Extend", description="Keep the current selection")
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         self.extend = event.shift
         return self.execute(context)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
         part = segment_list.active_part(settings)
         objects = [obj for obj in segment_list.labeled(settings) if obj.visible_get()]
         if context.mode == "EDIT_MESH":
             objects = [obj for obj in objects if obj.mode == "EDIT"]
         if part is None or not objects:
-            _report.tell(self, {"WARNING"}, "No object with segments is to be seen here")
+            _report.tell(self, {"WARNING"}, "No object with segments is visible here")
             return {"CANCELLED"}
         context.scene.tool_settings.mesh_select_mode = (False, False, True)
         if context.mode == "OBJECT":
@@ -47,12 +47,13 @@ class WKS_SEGMENT_OT_select_segment(bpy.types.Operator):
         if not self.extend:
             bpy.ops.mesh.select_all(action="DESELECT")
         count = sum(_select(mesh, part) for mesh in segment_list.meshes_of(objects))
-        _report.tell(self, {"INFO"}, f"{count} faces of {settings.style().name_of(part)}")
+        segment = settings.style().name_of(part)
+        _report.tell(self, {"INFO"}, Message("Selected {count} faces of {segment}", count=count, segment=segment))
         return {"FINISHED"}
 
 
 def _select(mesh: bpy.types.Mesh, part: int) -> int:
-    """Select the faces of a part that are to be seen, in Edit Mode; how many."""
+    """Select the visible faces of a part in Edit Mode; return how many."""
     edit = bmesh.from_edit_mesh(mesh)
     labels = edit.faces.layers.int.get(note_of(mesh).get("faces", ""))
     faces = [] if labels is None else [face for face in edit.faces if face[labels] == part and not face.hide]

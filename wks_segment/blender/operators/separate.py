@@ -4,41 +4,33 @@ from __future__ import annotations
 
 import bpy
 
+from ...core.message import Message
 from ..errors import UserError
 from ..outputs.labels import labels_on
 from ..outputs.separate import separate, whole_of
 from ..scene.characters import group, selected_meshes
-from . import _report
+from . import _needs, _report
+from ._base import BaseOperator
 
 
-class WKS_SEGMENT_OT_separate(bpy.types.Operator):
-    """Make an object of each segment of the selected objects. These are hidden, and come back with Clear"""
+class WKS_SEGMENT_OT_separate(BaseOperator, bpy.types.Operator):
+    """Make an object of each segment of the selected objects, which are hidden until Clear"""
 
     bl_idname = "wks_segment.separate"
     bl_label = "Separate by Segments"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return (
-            _report.no_job_runs(cls, context)
-            and _report.in_object_mode(cls, context)
-            and _report.has_labeled_mesh(cls, context)
-        )
+    needs = (_needs.no_job, _needs.object_mode, _needs.labeled_mesh)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         style = context.scene.wks_segment.style()
-        pieces = []
-        try:
-            for character in group(selected_meshes(context)):
-                for obj in character.objects:
-                    if whole_of(obj) is not None:
-                        raise UserError(f'"{obj.name}" is separated already: Clear it first')
-                    labels = labels_on(obj.data)
-                    if labels is not None:
-                        pieces += separate(context, obj, labels, style)
-        except UserError as error:
-            _report.tell(self, {"ERROR"}, str(error))
-            return {"CANCELLED"}
-        _report.tell(self, {"INFO"}, f"Separated into {len(pieces)} objects")
+        separated = []
+        for character in group(selected_meshes(context)):
+            for obj in character.objects:
+                if whole_of(obj) is not None:
+                    raise UserError('"{object}" is separated already: Clear it first', object=obj.name)
+                labels = labels_on(obj.data)
+                if labels is not None:
+                    separated += separate(context, obj, labels, style)
+        _report.tell(self, {"INFO"}, Message("Separated into {count} objects", count=len(separated)))
         return {"FINISHED"}

@@ -7,27 +7,27 @@ import numpy as np
 from bpy.props import IntProperty
 
 from ...core.mesh.triangle_mesh import BoolArray, IntArray
+from ...core.message import Message
 from ..outputs.labels import labels_on
 from ..scene.attributes import read_bools, read_ints, write_bools
 from ..scene.topology import at_corners
 from ..workflow import segment_list
-from . import _report
+from . import _needs, _report
+from ._base import BaseOperator
 
 
-class _Shows:
-    """What the three share: they say for each face whether it is hidden."""
+class _HidesFaces(BaseOperator):
+    """Shared by the three operators, which say for each face whether it is hidden."""
 
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _report.has_segments(cls, context)
+    needs = (_needs.object_or_edit_mode, _needs.active_segment)
 
     def hidden(self, labels: IntArray, before: BoolArray, settings: bpy.types.PropertyGroup) -> BoolArray:
-        """(p,) whether faces of these parts are hidden, given whether they were."""
+        """(p,) whether each face is hidden afterwards, given the part of each and whether it was hidden before."""
         raise NotImplementedError
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
         meshes, count = segment_list.meshes_of(segment_list.labeled(settings)), 0
         with segment_list.object_mode(context):
@@ -38,30 +38,35 @@ class _Shows:
                     _hide(mesh, hidden)
                     count += int(hidden.sum())
             segment_list.fill(settings)
-        where = " in Edit Mode, Sculpt Mode and while painting" if count and context.mode == "OBJECT" else ""
-        _report.tell(self, {"INFO"}, f"{count or 'No'} faces are hidden{where}")
+        if not count:
+            message = Message("No faces are hidden")
+        elif context.mode == "OBJECT":
+            message = Message("{count} faces are hidden in Edit Mode, Sculpt Mode and while painting", count=count)
+        else:
+            message = Message("{count} faces are hidden", count=count)
+        _report.tell(self, {"INFO"}, message)
         return {"FINISHED"}
 
 
-class WKS_SEGMENT_OT_hide_segment(_Shows, bpy.types.Operator):
+class WKS_SEGMENT_OT_hide_segment(_HidesFaces, bpy.types.Operator):
     """Hide the faces of a segment in Edit Mode, Sculpt Mode and while painting, or show them again"""
 
     bl_idname = "wks_segment.hide_segment"
     bl_label = "Hide or Show Segment"
 
     part: IntProperty(
-        name="Segment", description="Number of the segment; -1: the active one", default=-1, min=-1,
+        name="Segment", description="Number of the segment, -1 for the active one", default=-1, min=-1,
         options={"SKIP_SAVE"},
     )  # fmt: skip
 
     def hidden(self, labels: IntArray, before: BoolArray, settings: bpy.types.PropertyGroup) -> BoolArray:
         part = self.part if self.part >= 0 else segment_list.active_part(settings)
-        shown = any(item.number == part and not item.hidden for item in settings.segments)
-        return np.where(labels == part, shown, before)
+        is_shown = any(item.number == part and not item.hidden for item in settings.segments)
+        return np.where(labels == part, is_shown, before)
 
 
-class WKS_SEGMENT_OT_isolate_segment(_Shows, bpy.types.Operator):
-    """Hide all faces but those of the active segment"""
+class WKS_SEGMENT_OT_isolate_segment(_HidesFaces, bpy.types.Operator):
+    """Hide all faces except those of the active segment"""
 
     bl_idname = "wks_segment.isolate_segment"
     bl_label = "Isolate Segment"
@@ -70,7 +75,7 @@ class WKS_SEGMENT_OT_isolate_segment(_Shows, bpy.types.Operator):
         return np.asarray(labels != segment_list.active_part(settings))
 
 
-class WKS_SEGMENT_OT_show_segments(_Shows, bpy.types.Operator):
+class WKS_SEGMENT_OT_show_segments(_HidesFaces, bpy.types.Operator):
     """Show the faces of all segments"""
 
     bl_idname = "wks_segment.show_segments"
@@ -81,13 +86,13 @@ class WKS_SEGMENT_OT_show_segments(_Shows, bpy.types.Operator):
 
 
 def _hide(mesh: bpy.types.Mesh, hidden: BoolArray) -> None:
-    """Hide these faces, and the vertices and edges that are of hidden faces only."""
+    """Hide these faces, and the vertices and edges that only hidden faces have."""
     corners = at_corners(mesh, hidden)
-    for elements, of_corner in ((mesh.vertices, "vertex_index"), (mesh.edges, "edge_index")):
-        of = read_ints(mesh.loops, of_corner)
-        gone = read_bools(elements, "hide")
-        gone[of] = True
-        gone[of[~corners]] = False
-        write_bools(elements, "hide", gone)
+    for elements, index_name in ((mesh.vertices, "vertex_index"), (mesh.edges, "edge_index")):
+        indices = read_ints(mesh.loops, index_name)
+        elements_hidden = read_bools(elements, "hide")
+        elements_hidden[indices] = True
+        elements_hidden[indices[~corners]] = False
+        write_bools(elements, "hide", elements_hidden)
     write_bools(mesh.polygons, "hide", hidden)
     mesh.update()

@@ -4,29 +4,26 @@ from __future__ import annotations
 
 import bpy
 
-from ..errors import UserError
-from ..workflow.live_session import NOTHING, session_of
-from . import _report
+from ...core.message import Message
+from ..workflow.live_session import NOTHING_TO_UPDATE, session_of
+from . import _needs, _report
+from ._base import BaseOperator
 
 
-class WKS_SEGMENT_OT_update(bpy.types.Operator):
-    """Find the segments of what was learned or applied last anew, with the settings as they are now"""
+def _kept_job(context: bpy.types.Context) -> Message | None:
+    """Labels in this scene that are from the job that the session keeps."""
+    return None if session_of(context).holds(context.scene) else Message(NOTHING_TO_UPDATE)
+
+
+class WKS_SEGMENT_OT_update(BaseOperator, bpy.types.Operator):
+    """Update the segments that were learned or applied last to the current settings"""
 
     bl_idname = "wks_segment.update"
     bl_label = "Update Segments"
     bl_options = {"UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not session_of(context).holds(context.scene):
-            _report.explain(cls, NOTHING)
-            return False
-        return _report.no_job_runs(cls, context) and _report.in_object_mode(cls, context)
+    needs = (_kept_job, _needs.no_job, _needs.object_mode)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        try:
-            work = session_of(context).update(context.scene)
-        except UserError as error:
-            _report.tell(self, {"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return _report.finish(self, "Updated", work.report)
+    def run(self, context: bpy.types.Context) -> set[str]:
+        job = session_of(context).update(context.scene)
+        return _report.finish(self, "Updated", job.report)

@@ -1,39 +1,47 @@
-"""A row in the list of models."""
+"""Rows of the list of models and of the ranking."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import bpy
-from bpy.props import IntProperty, StringProperty
+from bpy.props import FloatProperty, IntProperty, StringProperty
 
-from ..workflow import model_library
+from .changes import listener
 
 
-def _renamed(item: Any, context: bpy.types.Context) -> None:
-    model_library.make_unique(item.id_data.wks_segment, item)
+def _renamed(row: Any, context: bpy.types.Context) -> None:
+    listener().model_renamed(row.id_data.wks_segment, row)
 
 
 class WKSModelItem(bpy.types.PropertyGroup):
     """A learned model of this scene.
 
-    The one in use lies in the scene's settings, where labels and notes are read and written; its row has no text.
+    The text of the model in use is kept in the settings, where labels, names and colors are read and written; its row
+    holds none.
     """
 
-    name: StringProperty(name="Name", description="Name of the model, no two the same", update=_renamed)
-    n_segments: IntProperty(name="Segments", description="Number of kinds of parts that the model has", min=0)
+    name: StringProperty(name="Name", description="Name of the model, unique in the list", update=_renamed)
+    n_segments: IntProperty(name="Segments", description="Number of segments of the model", min=0)
     date: StringProperty(name="Date", description="Day on which the model was learned or imported")
-    model: StringProperty(options={"HIDDEN"}, description="The model, as JSON, while another one is in use")
-    summary: StringProperty(options={"HIDDEN"}, description="Lines on what it was learned from")
-    notes: StringProperty(options={"HIDDEN"}, description="Names and colors of its segments, as JSON")
+    model: StringProperty(options={"HIDDEN"}, description="The model as JSON while another one is in use")
+    summary: StringProperty(options={"HIDDEN"}, description="Lines on what the model was learned from")
+    summary_messages: StringProperty(
+        options={"HIDDEN"}, description="The same lines as JSON with templates and values, for other languages"
+    )
+    notes: StringProperty(options={"HIDDEN"}, description="Names and colors of the model's segments as JSON")
 
 
 class WKSRankItem(bpy.types.PropertyGroup):
-    """A model in the list of those that may fit."""
+    """A model of the ranking."""
 
     name: StringProperty(name="Name", description="Name of the model")
-    path: StringProperty(options={"HIDDEN"}, description="Its file in the model folder; empty: it is in this scene")
-    score: bpy.props.FloatProperty(name="Score", description="How well it explains the character, per energy")
-    probability: bpy.props.FloatProperty(
-        name="Probability", description="How probable it is among these models", min=0.0, max=1.0
+    path: StringProperty(
+        options={"HIDDEN"}, description="File of the model in the model folder, empty for a model of this scene"
+    )
+    score: FloatProperty(
+        name="Score", description="Log-likelihood of the character under the model, per energy of the signature"
+    )
+    probability: FloatProperty(
+        name="Probability", description="Probability of the model among the ranked ones", min=0.0, max=1.0
     )

@@ -1,4 +1,4 @@
-"""A row in the list of segments."""
+"""A row of the list of segments."""
 
 from __future__ import annotations
 
@@ -8,41 +8,41 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
-from ..workflow import segment_list
+from .changes import listener
 
 
-def _get_name(item: Any) -> str:
-    return item.id_data.wks_segment.style().name_of(item.number)
+def _get_name(row: Any) -> str:
+    return row.id_data.wks_segment.style().name_of(row.number)
 
 
-def _set_name(item: Any, name: str) -> None:
-    segment_list.rename(item.id_data.wks_segment, item.number, name)
+def _set_name(row: Any, name: str) -> None:
+    listener().rename_part(row.id_data.wks_segment, row.number, name)
 
 
-def _get_color(item: Any) -> list[float]:
-    return item.id_data.wks_segment.style().colors_of(np.array(item.number)).tolist()
+def _get_color(row: Any) -> list[float]:
+    return row.id_data.wks_segment.style().colors_of(np.array(row.number)).tolist()
 
 
-def _set_color(item: Any, color: Any) -> None:
+def _set_color(row: Any, color: Any) -> None:
     red, green, blue = (float(channel) for channel in color)
-    segment_list.recolor(item.id_data.wks_segment, item.number, (red, green, blue))
+    listener().recolor_part(row.id_data.wks_segment, row.number, (red, green, blue))
 
 
 class WKSSegmentItem(bpy.types.PropertyGroup):
-    """A segment, or its left or right part. Name and color are read from and written to the notes on the parts."""
+    """A part: a segment, or its left or right side. Name and color are kept in the settings' notes on parts."""
 
     name: StringProperty(
         name="Name",
-        description="Name of the segment, of its materials and vertex groups. The other side is called alike. Empty: "
-        "the number again",
+        description="Name of the segment, its materials and its vertex groups, shared by both sides; empty for the "
+        "number",
         get=_get_name, set=_set_name,
     )  # fmt: skip
     color: FloatVectorProperty(
-        name="Color", description="Color of the segment wherever it is written",
+        name="Color", description="Color of the segment in all outputs",
         subtype="COLOR_GAMMA", size=3, min=0.0, max=1.0, get=_get_color, set=_set_color,
     )  # fmt: skip
-    number: IntProperty(name="Number", description="The number that is written to faces", min=0, max=3000)
+    number: IntProperty(name="Number", description="Number that is written to faces", min=0, max=3000)
     share: FloatProperty(
-        name="Share", description="Share of the area", min=0.0, max=100.0, precision=1, subtype="PERCENTAGE"
+        name="Share", description="Share of the surface area", min=0.0, max=100.0, precision=1, subtype="PERCENTAGE"
     )
-    hidden: BoolProperty(name="Hidden", description="Whether all of its faces are hidden")
+    hidden: BoolProperty(name="Hidden", description="Whether all faces of the segment are hidden")

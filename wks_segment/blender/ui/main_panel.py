@@ -8,17 +8,18 @@ from typing import Any
 
 import bpy
 
+from ...core.message import Message
 from ..props.presets import WKS_SEGMENT_PT_presets
-from ..workflow.background_job import desk_of
+from ..workflow.background_job import Job, job_holder
 from ..workflow.live_session import session_of
 from .messages import in_panel
 
-WIDTH = 36
-"""Letters in a line of the sidebar, about: Blender cuts off what is longer."""
+SIDEBAR_LETTERS = 36
+"""Letters in a line of the sidebar at its default width, about: Blender cuts off the rest."""
 
 
 class _Sidebar:
-    """What all panels share: their place and the look of their settings."""
+    """Shared by all panels: their place and the look of their settings."""
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
@@ -27,7 +28,7 @@ class _Sidebar:
     layout: Any
 
     def settings(self, context: bpy.types.Context, *names: str) -> Any:
-        """Show settings below each other, their names to the left; returns the settings themselves."""
+        """Show settings below each other with their names to the left; return the property group."""
         settings = context.scene.wks_segment
         self.layout.use_property_split = True
         self.layout.use_property_decorate = False
@@ -37,7 +38,7 @@ class _Sidebar:
         return settings
 
     def segments(self, context: bpy.types.Context) -> None:
-        """Show the number of segments, gray where it is found."""
+        """Show the number of segments, gray if it is automatic."""
         settings = context.scene.wks_segment
         column = self.layout.column()
         number = column.column()
@@ -46,7 +47,7 @@ class _Sidebar:
         column.prop(settings, "auto_segments")
 
     def live(self, context: bpy.types.Context) -> None:
-        """Show whether labels follow the settings, and if not, why, and how they can."""
+        """Show whether labels follow the settings, and if not, why not and the button to update them."""
         settings, session = context.scene.wks_segment, session_of(context)
         self.settings(context, "live")
         if not session.holds(context.scene):
@@ -62,30 +63,33 @@ class _Sidebar:
             return
         slow = session.is_slow
         if settings.live and slow:
-            for line in wrapped(f"Labels take {session.seconds:.0f} seconds here, too long to follow by themselves"):
+            text = Message(
+                "Labels take {seconds:.0f} seconds here, too long to follow by themselves", seconds=session.seconds
+            )
+            for line in wrapped(text):
                 column.label(text=line)
-        for line in wrapped(session.said):
+        for line in wrapped(session.message):
             column.label(text=line)
-        if not session.follows(context.scene) and not session.waits:
+        if not session.is_current(context.scene) and not session.is_scheduled:
             column.operator("wks_segment.update", icon="FILE_REFRESH")
 
     def job(self, context: bpy.types.Context) -> None:
-        """Show how far the running job is, or why the last one was ended."""
-        desk = desk_of(context)
-        stage, left = desk.job.lines if desk.job is not None else (desk.said, "")
+        """Show the stage and the progress of the running job, or why the last one ended."""
+        holder = job_holder(context)
+        stage, left = job_texts(holder.job) if holder.job is not None else (in_panel(holder.message), "")
         if not stage:
             return
         column = self.layout.column(align=True)
-        for line in wrapped(stage):
+        for line in wrapped_lines(stage):
             column.label(text=line)
-        if desk.job is not None:
+        if holder.job is not None:
             row = column.row(align=True)
-            row.progress(factor=desk.job.share, text=left)
+            row.progress(factor=holder.job.share, text=left)
             row.operator("wks_segment.cancel", text="", icon="CANCEL")
 
 
 class WKS_SEGMENT_PT_main(_Sidebar, bpy.types.Panel):
-    """Poses, the settings that labels follow, and the three buttons."""
+    """Main panel: poses, the settings that labels follow, and the buttons."""
 
     bl_label = "WKS Segment"
     bl_idname = "WKS_SEGMENT_PT_main"
@@ -114,14 +118,14 @@ class WKS_SEGMENT_PT_main(_Sidebar, bpy.types.Panel):
 
 
 class SubPanel(_Sidebar):
-    """A part of the panel that starts closed."""
+    """A panel within the main panel, closed at first."""
 
     bl_parent_id = WKS_SEGMENT_PT_main.bl_idname
     bl_options = {"DEFAULT_CLOSED"}
 
 
 class WKS_SEGMENT_PT_outputs(SubPanel, bpy.types.Panel):
-    """What is written."""
+    """Outputs: what is written of the segments."""
 
     bl_label = "Outputs"
 
@@ -139,7 +143,7 @@ class WKS_SEGMENT_PT_outputs(SubPanel, bpy.types.Panel):
 
 
 class WKS_SEGMENT_PT_bake(SubPanel, bpy.types.Panel):
-    """The ID map."""
+    """Settings of the ID map, and its button."""
 
     bl_label = "ID Map"
 
@@ -149,7 +153,7 @@ class WKS_SEGMENT_PT_bake(SubPanel, bpy.types.Panel):
 
 
 class WKS_SEGMENT_PT_advanced(SubPanel, bpy.types.Panel):
-    """What most users leave as it is."""
+    """Settings that most users leave as they are."""
 
     bl_label = "Advanced"
 
@@ -170,11 +174,27 @@ class WKS_SEGMENT_PT_advanced(SubPanel, bpy.types.Panel):
         )
 
 
+def job_texts(job: Job) -> tuple[str, str]:
+    """Stage and time left of a job in the user's language: "Signature of Fox · 3 of 5" and "about 20 s left".
+
+    The share that is done as long as the time left is unknown, and why the job ends once it was asked to.
+    """
+    if job.ending:
+        return in_panel("Canceling"), in_panel(job.reason)
+    stage = re.sub(r" \((\d+ \w+ \d+)\)$", r" · \1", in_panel(job.stage).replace('"', ""))
+    return stage, in_panel(job.time_left) or f"{100 * job.share:.0f} %"
+
+
 def wrapped(text: str) -> list[str]:
-    """A message in lines that the sidebar has room for; what is a pair of numbers stays together, as "3 of 5" does."""
+    """A text in the user's language, in lines that fit into the sidebar."""
+    return wrapped_lines(in_panel(text))
+
+
+def wrapped_lines(shown: str) -> list[str]:
+    """A translated text in lines that fit into the sidebar; a pair of numbers such as "3 of 5" stays in one line."""
     pair = r"(?<=\d) (?=\d|(of|von) \d)|((?<=\d of)|(?<=\d von)) (?=\d)"
-    joined = re.sub(pair, "\N{NO-BREAK SPACE}", in_panel(text))
-    return [short for line in joined.splitlines() for short in wrap(line, WIDTH)]
+    joined = re.sub(pair, "\N{NO-BREAK SPACE}", shown)
+    return [short for line in joined.splitlines() for short in wrap(line, SIDEBAR_LETTERS)]
 
 
 CLASSES = (

@@ -1,4 +1,4 @@
-"""The operators in the Object menu, and thereby in Blender's search of menus (F3)."""
+"""The operators in the Object menu, so that the menu search (F3) finds them as well."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import bpy
 
 
 class WKS_SEGMENT_MT_object(bpy.types.Menu):
-    """What can be done with the selected objects."""
+    """Operators for the selected objects."""
 
     bl_idname = "WKS_SEGMENT_MT_object"
     bl_label = "WKS Segment"
 
     def draw(self, context: bpy.types.Context) -> None:
-        # As by the buttons: a job in a thread, a question before a large one.
+        # As by the buttons, jobs run in a thread, and a large one is asked about.
         self.layout.operator_context = "INVOKE_DEFAULT"
         for name in ("learn", "apply", "rank", "apply_ranked", "clear"):
             self.layout.operator(f"wks_segment.{name}")
@@ -25,7 +25,7 @@ class WKS_SEGMENT_MT_object(bpy.types.Menu):
 
 
 def draw_in_object_menu(menu: Any, context: bpy.types.Context) -> None:
-    """Added to Blender's own menu."""
+    """Append the menu to Blender's Object menu."""
     menu.layout.separator()
     menu.layout.menu(WKS_SEGMENT_MT_object.bl_idname)
 

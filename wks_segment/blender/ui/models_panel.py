@@ -1,4 +1,4 @@
-"""The list of models in the sidebar, and which of them fit."""
+"""The list of models in the sidebar, and the ranking."""
 
 from __future__ import annotations
 
@@ -6,24 +6,24 @@ from typing import Any
 
 import bpy
 
+from ...core.message import Message
 from ..props.preferences import model_folder
 from ..workflow import model_library
+from ..workflow.certainty import is_certainty
+from ..workflow.stored_messages import restored
 from .main_panel import SubPanel, wrapped
 from .messages import in_panel
 
 NO_MODEL = "No model yet:\nselect a character,\nthen Learn and Segment"
 NO_FOLDER = "No models there: set Model Folder in the preferences of the add-on"
-SHOWN = 6
-"""Models of a ranking that are shown."""
+SHOWN_RANKS = 6
+"""Models of the ranking that are shown: the panel stays short, and later models are hardly ever right."""
 
 
 class WKS_SEGMENT_UL_models(bpy.types.UIList):
-    """A row: name and number of segments. The sidebar is too narrow for more."""
+    """Row of the list: name and number of segments. The sidebar is too narrow for more."""
 
-    def draw_item(
-        self, context: bpy.types.Context, layout: Any, data: Any, item: Any, icon: int, active_data: Any,
-        active_property: str, index: int = 0, flt_flag: int = 0,
-    ) -> None:  # fmt: skip
+    def draw_item(self, context: bpy.types.Context, layout: Any, data: Any, item: Any, *_: Any) -> None:
         row = layout.row(align=True)
         row.prop(item, "name", text="", emboss=False)
         segments = row.row(align=True)
@@ -32,22 +32,22 @@ class WKS_SEGMENT_UL_models(bpy.types.UIList):
 
 
 class WKS_SEGMENT_MT_model_folder(bpy.types.Menu):
-    """Models of the model folder, to be added to this file."""
+    """Models of the model folder, to add to this file."""
 
     bl_idname = "WKS_SEGMENT_MT_model_folder"
     bl_label = "Add from Model Folder"
 
     def draw(self, context: bpy.types.Context) -> None:
-        found = model_library.in_folder(model_folder(context))
-        self.layout.operator_context = "EXEC_DEFAULT"  # or it would ask for the file
-        for name, path in found.items():
+        models = model_library.in_folder(model_folder(context))
+        self.layout.operator_context = "EXEC_DEFAULT"  # without the file browser
+        for name, path in models.items():
             self.layout.operator("wks_segment.load_model", text=name, translate=False).filepath = str(path)
-        if not found:
+        if not models:
             self.layout.label(text=in_panel(NO_FOLDER))
 
 
 class WKS_SEGMENT_PT_models(SubPanel, bpy.types.Panel):
-    """The list, what can be done with its active model, and the ranking."""
+    """Models panel: the list, buttons for its active model, and the ranking."""
 
     bl_label = "Models"
 
@@ -72,13 +72,14 @@ class WKS_SEGMENT_PT_models(SubPanel, bpy.types.Panel):
 
 
 def draw_ranking(layout: Any, settings: Any) -> None:
-    """Show which models fit, best first; a button applies one."""
+    """Show the ranked models, best first, each with a button to apply it."""
     if not settings.ranking:
         return
     column = layout.column(align=True)
-    for line in wrapped(settings.verdict):
-        column.label(text=line)
-    for index, item in enumerate(settings.ranking[:SHOWN]):
+    for text in restored(settings.verdict, settings.verdict_messages):
+        for line in wrapped(text):
+            column.label(text=line)
+    for index, item in enumerate(settings.ranking[:SHOWN_RANKS]):
         row = column.row(align=True)
         row.label(text=item.name, translate=False)
         share = row.row(align=True)
@@ -91,12 +92,12 @@ def details(settings: Any) -> list[str]:
     """Lines on the model in use: what it was learned from, and when."""
     if not settings.model:
         return wrapped(NO_MODEL)
-    row = model_library.in_use(settings)
-    first, *rest = settings.model_summary.splitlines() or [""]
-    facts = [line for line in rest if not line.startswith("Certainty")]
-    long = [line for line in rest if line.startswith("Certainty")]
+    row = model_library.active_row(settings)
+    origin, *others = model_library.summary_of(settings)
+    facts = [text for text in others if not is_certainty(text)]
     day = [row.date] if row is not None and row.date else []
-    return [found for line in (first, " · ".join([*facts, *day]), *long) for found in wrapped(line)]
+    texts = [origin, Message.joined(" · ", [*facts, *day]), *filter(is_certainty, others)]
+    return [line for text in texts for line in wrapped(text)]
 
 
 CLASSES = (WKS_SEGMENT_UL_models, WKS_SEGMENT_MT_model_folder, WKS_SEGMENT_PT_models)

@@ -6,11 +6,12 @@ from typing import Any
 
 import bpy
 
+from ...core.message import Message
 from .main_panel import SubPanel, wrapped
 from .messages import in_panel
 from .translations import NAME
 
-PRESETS = {
+NAME_PRESETS = {
     "Human": (
         "Head", "Hair", "Neck", "Torso", "Hips", "Arm", "Upper Arm", "Forearm", "Hand", "Leg", "Thigh", "Shin", "Foot",
         "Clothes",
@@ -20,21 +21,18 @@ PRESETS = {
         "Hind Paw", "Mane",
     ),
 }  # fmt: skip
-"""Names to choose from. Sides have theirs from the part: .L and .R."""
-EMPTY = "No segments yet: learn a model, or apply one"
+"""Names to choose from, without the suffix of a side, which comes with the part."""
+NO_SEGMENTS = "No segments yet: learn a model, or apply one"
 
 
 class WKS_SEGMENT_UL_segments(bpy.types.UIList):
-    """A row: color, name, share, visibility."""
+    """Row of the list: color, name, share of the area, visibility."""
 
-    def draw_item(
-        self, context: bpy.types.Context, layout: Any, data: Any, item: Any, icon: int, active_data: Any,
-        active_property: str, index: int = 0, flt_flag: int = 0,
-    ) -> None:  # fmt: skip
+    def draw_item(self, context: bpy.types.Context, layout: Any, data: Any, item: Any, *_: Any) -> None:
         row = layout.row(align=True)
         color = row.row(align=True)
         color.ui_units_x = 1.2
-        # Colors are written to corners of faces, which is not possible in Edit Mode.
+        # Colors are attributes of face corners, which cannot be written in Edit Mode.
         color.enabled = context.mode != "EDIT_MESH"
         color.prop(item, "color", text="")
         row.separator(factor=0.5)
@@ -48,7 +46,7 @@ class WKS_SEGMENT_UL_segments(bpy.types.UIList):
 
 
 class WKS_SEGMENT_MT_merge(bpy.types.Menu):
-    """The segments that the active one can be merged with."""
+    """Segments that the active one can be merged into."""
 
     bl_idname = "WKS_SEGMENT_MT_merge"
     bl_label = "Merge Into"
@@ -68,17 +66,17 @@ class WKS_SEGMENT_MT_names(bpy.types.Menu):
 
     def draw(self, context: bpy.types.Context) -> None:
         row = self.layout.row()
-        for preset, names in PRESETS.items():
+        for preset, names in NAME_PRESETS.items():
             column = row.column()
             column.label(text=preset, text_ctxt=NAME)
             for name in names:
-                # As with Blender's own objects, the name itself is translated only if the user wants that of new data.
+                # As for Blender's own objects, a preference decides whether names of new data are translated.
                 given = bpy.app.translations.pgettext_data(name, NAME)
                 column.operator("wks_segment.name_segment", text=name, text_ctxt=NAME).name = given
 
 
 class WKS_SEGMENT_MT_specials(bpy.types.Menu):
-    """What is needed less often."""
+    """Operators that are needed less often."""
 
     bl_idname = "WKS_SEGMENT_MT_specials"
     bl_label = "Segment Specials"
@@ -92,7 +90,7 @@ class WKS_SEGMENT_MT_specials(bpy.types.Menu):
 
 
 class WKS_SEGMENT_PT_segments(SubPanel, bpy.types.Panel):
-    """The list, and what can be done with its active segment."""
+    """Segments panel: the list, and buttons for its active segment."""
 
     bl_label = "Segments"
     bl_options = set()
@@ -102,7 +100,7 @@ class WKS_SEGMENT_PT_segments(SubPanel, bpy.types.Panel):
         if not settings.segments:
             row = layout.row()
             column = row.column()
-            for line in wrapped(EMPTY):
+            for line in wrapped(NO_SEGMENTS):
                 column.label(text=line)
             row.operator("wks_segment.refresh_segments", text="", icon="FILE_REFRESH", emboss=False)
             return
@@ -125,7 +123,8 @@ class WKS_SEGMENT_PT_segments(SubPanel, bpy.types.Panel):
             row.menu("WKS_SEGMENT_MT_merge", text=in_panel("Merge Into"))
             row.operator("wks_segment.split_segment", text=in_panel("Split"))
         if settings.faces_by_hand:
-            layout.label(text=in_panel(f"{settings.faces_by_hand} faces by hand"), icon="HAND")
+            text = Message("{count} faces by hand", count=settings.faces_by_hand)
+            layout.label(text=in_panel(text), icon="HAND")
 
 
 CLASSES = (

@@ -1,1 +1,1 @@
-"""What operators and the command line run: the pipeline, background jobs, the live session, models."""
+"""What the operators and the command line run: the pipeline, background jobs, the live session, models."""

@@ -1,11 +1,10 @@
-"""Jobs: work in a thread, while the window lives on. One at a time; the desk holds it.
+"""Jobs that compute in a thread while the window stays responsive. One job runs at a time; `JobHolder` holds it.
 
-The thread knows no Blender. Blender's own thread looks after it: `Job.step` is what a timer calls.
+The thread must not touch Blender. Blender's own thread looks after the job by calling `Job.step` from a timer.
 """
 
 from __future__ import annotations
 
-import re
 import threading
 import time
 from collections.abc import Callable
@@ -14,152 +13,160 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from ...core.poses.describe import Progress
+from ...core.message import Message, message_of
+from ...core.progress import Progress
 from ..errors import ChangedError, EndedError, UserError
-from ..ui.messages import in_panel
 
-TICK = 0.1
-"""Seconds between two looks at a job."""
-SURE_AFTER, SURE_SHARE = 2.0, 0.03
-"""Seconds and share of the work from which on the time left means something."""
-SMOOTHING = 0.05
-"""Weight of the newest estimate of the whole time among those before it."""
-PATIENCE = 3.0
-"""Seconds that Blender waits for a job when it is quit or the extension disabled."""
-HOLDER = "wks_segment_desk"
-"""Name of the desk at the type of Blender's window manager."""
-BUSY = "A job is running: wait or cancel it"
+TIMER_INTERVAL = 0.1
+"""Seconds between two looks at a job. With more the bar moves in jumps; with less Blender redraws for nothing."""
+ESTIMATE_AFTER_SECONDS, ESTIMATE_AFTER_SHARE = 2.0, 0.03
+"""Seconds and share of the work before the first estimate of the time left: an earlier one would be far off."""
+ESTIMATE_WEIGHT = 0.05
+"""Weight of the newest estimate of the whole time in the running mean, which thus covers about 20 looks or two seconds.
+With more the shown time jumps; with less it lags when a stage is slower than the one before."""
+EXIT_WAIT = 3.0
+"""Seconds to wait for the job when Blender quits or the extension is disabled. A job usually ends sooner; one that does
+not must not keep Blender open."""
+JOB_HOLDER = "wks_segment_job_holder"
+"""Name of the job holder at the type of Blender's window manager."""
+JOB_RUNNING = "A job is running: wait or cancel it"
 
 
-class Canceled(Exception):  # noqa: N818  # no error, but the way out of the thread
-    """Raised by the progress of a job that is to end."""
+class Canceled(Exception):  # noqa: N818  # not an error, only the way out of the thread
+    """Raised in the thread by the progress of a job that is to end."""
 
 
 class TimeLeft:
-    """From a share of the work that grows by leaps, the seconds that are left, smoothed."""
+    """Estimate of the seconds that are left, smoothed, since the share of the work that is done grows by leaps."""
 
     def __init__(self) -> None:
-        self._whole: float | None = None
+        self._total: float | None = None
         self._left: float | None = None
 
-    def tell(self, seconds: float, share: float) -> None:
-        """Say how much was done after how many seconds."""
-        if seconds < SURE_AFTER or share < SURE_SHARE:
+    def update(self, seconds: float, share: float) -> None:
+        """Take into account that a share of the work was done after some seconds."""
+        if seconds < ESTIMATE_AFTER_SECONDS or share < ESTIMATE_AFTER_SHARE:
             return
-        whole = seconds / share
-        self._whole = whole if self._whole is None else self._whole + SMOOTHING * (whole - self._whole)
-        self._left = max(self._whole - seconds, 0.0)
+        total = seconds / share
+        self._total = total if self._total is None else self._total + ESTIMATE_WEIGHT * (total - self._total)
+        self._left = max(self._total - seconds, 0.0)
 
-    def __str__(self) -> str:
-        """As a person says it; empty as long as it is not known."""
+    @property
+    def text(self) -> str:
+        """The estimate for the user, rounded; empty as long as there is none."""
         if self._left is None:
             return ""
         if self._left < 5:
             return "a few seconds left"
         if self._left < 90:
-            return f"about {5 * round(self._left / 5)} s left"
-        return f"about {round(self._left / 60)} min left"
+            return Message("about {seconds} s left", seconds=5 * round(self._left / 5))
+        return Message("about {minutes} min left", minutes=round(self._left / 60))
 
 
 class Job:
-    """Work in a thread.
+    """A computation in a thread.
 
     Parameters
     ----------
     name : str
-        As on the button.
+        Name for the user, the label of the button.
     compute : callable
-        The work, given a progress to call; must not touch Blender.
+        The computation, given its progress; must not touch Blender.
     check : callable
-        Raises ChangedError when the work has become pointless; called in Blender's thread, many times a second.
+        Raises ChangedError when the result has become useless; called in Blender's thread, many times a second.
     """
 
     def __init__(self, name: str, compute: Callable[[Progress], None], check: Callable[[], None]) -> None:
         self.name = name
         self.stage, self.share = "Starting", 0.0
-        self._left = TimeLeft()
+        self._time_left = TimeLeft()
         self._compute, self._check = compute, check
         self._reason = ""
         self._ending = threading.Event()
         self._error: BaseException | None = None
         self._began = time.monotonic()
-        # A daemon: Blender must not wait for it on its way out.
+        # A daemon, so that Blender can quit without waiting for it.
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
     def step(self) -> bool:
-        """Look at the work, from Blender's own thread; whether it is over, one way or another."""
+        """Look after the job from Blender's own thread; return whether the thread has ended."""
         over = not self._thread.is_alive()
         if not self.ending:
-            self._left.tell(time.monotonic() - self._began, self.share)
+            self._time_left.update(time.monotonic() - self._began, self.share)
             try:
                 self._check()
             except ChangedError as error:
-                self.end(str(error))
+                self.end(message_of(error))
         return over
 
     def end(self, reason: str = "") -> None:
-        """Let it end as soon as it can: for a reason, or because the user wants it. The first one counts."""
+        """Ask the thread to end as soon as it can; without a reason the user has canceled. The first call counts."""
         if not self.ending:
             self._reason = reason
             self._ending.set()
 
     def wait(self, seconds: float) -> None:
-        """Until it is over, but no longer."""
+        """Wait until the thread has ended, but no longer than this."""
         self._thread.join(seconds)
 
     def result(self) -> None:
-        """Of work that is over, raise the error that ended it, if one did; EndedError if `end` was called."""
+        """Raise the error that ended the thread, or EndedError if `end` was called."""
         if self.ending:
-            raise EndedError(self.epitaph)
+            raise EndedError(self.end_message)
         if self._error is not None:
             raise self._error
 
     @property
     def ending(self) -> bool:
-        """Whether it was told to end."""
+        """Whether the job was asked to end."""
         return self._ending.is_set()
 
     @property
     def succeeded(self) -> bool:
-        """Whether it is over, and as it should."""
+        """Whether the computation is complete."""
         return not (self._thread.is_alive() or self.ending or self._error)
 
     @property
-    def epitaph(self) -> str:
-        """How it was ended."""
-        if self._reason:
-            return f"{self.name} was ended, nothing is written: {self._reason}"
-        return f"{self.name} was canceled, nothing is written"
+    def reason(self) -> str:
+        """Why the job was asked to end; empty if the user canceled it."""
+        return self._reason
 
     @property
-    def lines(self) -> tuple[str, str]:
-        """What it is at, and how far, for the panel: "Signature of Fox, frame 12 · 3 of 5" and "about 20 s left"."""
-        if self.ending:
-            return in_panel("Canceling"), in_panel(self._reason)
-        stage = re.sub(r" \((\d+ \w+ \d+)\)$", r" · \1", in_panel(self.stage).replace('"', ""))
-        return stage, in_panel(str(self._left)) or f"{100 * self.share:.0f} %"
+    def time_left(self) -> str:
+        """Estimate of the time that is left, for the user; empty as long as there is none."""
+        return self._time_left.text
 
-    def _progress(self, stage: str, share: float) -> None:
-        """Called in the thread."""
+    @property
+    def end_message(self) -> str:
+        """What to tell the user about a job that was asked to end."""
+        if self._reason:
+            return Message(
+                "{job} was ended, nothing is written: {reason}", job=Message(self.name), reason=self._reason
+            )
+        return Message("{job} was canceled, nothing is written", job=Message(self.name))
+
+    def _report(self, stage: str, share: float) -> None:
+        """Called in the thread by the progress of the computation, which an error raised here ends."""
         self.stage, self.share = stage, share
         if self._ending.is_set():
             raise Canceled
 
     def _run(self) -> None:
         try:
-            self._progress(self.stage, self.share)
-            self._compute(self._progress)
-        except BaseException as error:  # whatever it is, it is raised again where somebody sees it
+            self._report(self.stage, self.share)
+            self._compute(Progress(self._report))
+        except BaseException as error:  # `result` raises it again in Blender's thread
             self._error = error
 
 
-class Desk:
-    """Where the one job lies, and why the last one was ended; ends the job when Blender takes away what it is about."""
+class JobHolder:
+    """Holds the running job and why the last one ended; ends the job when Blender takes away its objects."""
 
     def __init__(self) -> None:
         self.job: Job | None = None
-        self.said = ""
+        self.message = ""
+        """Why the last job ended early; empty if it did not."""
         self._timer: Any = None
         self._handlers = (
             (bpy.app.handlers.load_pre, self._on_load),
@@ -170,19 +177,19 @@ class Desk:
             handlers.append(function)
 
     def start(self, name: str, compute: Callable[[Progress], None], check: Callable[[], None]) -> Job:
-        """Begin a `Job`; UserError if there is one."""
+        """Start a `Job`; UserError if one is running."""
         if self.job is not None:
-            raise UserError(BUSY)
-        self.job, self.said = Job(name, compute, check), ""
+            raise UserError(JOB_RUNNING)
+        self.job, self.message = Job(name, compute, check), ""
         return self.job
 
-    def tick(self, context: bpy.types.Context) -> None:
-        """Let the window say ten times a second that time has passed, until the desk is cleared."""
-        self._timer = context.window_manager.event_timer_add(TICK, window=context.window)
+    def start_timer(self, context: bpy.types.Context) -> None:
+        """Let the window send timer events until the job is released."""
+        self._timer = context.window_manager.event_timer_add(TIMER_INTERVAL, window=context.window)
 
-    def clear(self, said: str = "") -> None:
-        """Take the job away; one that is not over ends by itself. What is said is shown until the next one."""
-        self.said = said
+    def release(self, message: str = "") -> None:
+        """Hold no job any more; one that still runs is asked to end. The panel shows the message until the next job."""
+        self.message = message
         if self.job is not None:
             self.job.end()
             self.job = None
@@ -191,11 +198,11 @@ class Desk:
             self._timer = None
 
     def close(self) -> None:
-        """End the job, and hear no more of Blender."""
+        """End the job and remove the handlers, before the extension is disabled."""
         if self.job is not None:
-            self.job.end("the extension was disabled")
-            self.job.wait(PATIENCE)
-        self.clear()
+            self.job.end(Message("the extension was disabled"))
+            self.job.wait(EXIT_WAIT)
+        self.release()
         for handlers, function in self._handlers:
             if function in handlers:
                 handlers.remove(function)
@@ -203,22 +210,22 @@ class Desk:
     @persistent
     def _on_load(self, *_: Any) -> None:
         if self.job is not None:
-            self.job.end("another file was opened")
+            self.job.end(Message("another file was opened"))
 
     @persistent
     def _on_undo(self, *_: Any) -> None:
         if self.job is not None:
-            self.job.end("a step was undone or redone")
+            self.job.end(Message("a step was undone or redone"))
 
 
-def desk_of(context: bpy.types.Context) -> Desk:
-    """The desk of this Blender."""
-    desk: Desk = getattr(context.window_manager, HOLDER)
-    return desk
+def job_holder(context: bpy.types.Context) -> JobHolder:
+    """The job holder of this Blender."""
+    holder: JobHolder = getattr(context.window_manager, JOB_HOLDER)
+    return holder
 
 
-def redraw(context: bpy.types.Context) -> None:
-    """Draw the sidebars anew, where the panel is."""
+def redraw_sidebars(context: bpy.types.Context) -> None:
+    """Redraw the sidebars of all 3D viewports, where the panel is."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":

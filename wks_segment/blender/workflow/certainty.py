@@ -1,13 +1,14 @@
-"""How certain a model is of each number of segments, for the panel, the terminal and `--json`."""
+"""Certainty of each number of segments, for the panel, the terminal and `--json`."""
 
 from __future__ import annotations
 
 from ...core import PoseSegmentation
 from ...core.learning.merge_tree import MOST_SEGMENTS
+from ...core.message import Message
 
 
 def certainties(model: PoseSegmentation) -> dict[int, float] | None:
-    """Certainty beyond chance of 2, 3, … segments, the numbers to choose from; None with the paper's setting."""
+    """Certainty beyond chance by number of segments, for 2, 3, …; None with the paper's setting."""
     if model.grouping_ is None:
         return None
     curve = model.grouping_.curve()[:MOST_SEGMENTS]
@@ -15,9 +16,14 @@ def certainties(model: PoseSegmentation) -> dict[int, float] | None:
 
 
 def certainty_lines(model: PoseSegmentation) -> list[str]:
-    """A line on why there are as many segments as there are, if their number was left open."""
-    found = certainties(model)
-    if model.n_segments != "auto" or not found:
+    """A line that says why the model has as many segments as it has, if the number was automatic; else none."""
+    shares = certainties(model)
+    if model.n_segments != "auto" or not shares:
         return []
-    each = " · ".join(f"{number} {share:.2f}" for number, share in found.items())
-    return [f"Certainty by segments: {each} ({model.n_segments_} taken)"]
+    curve = " · ".join(f"{number} {share:.2f}" for number, share in shares.items())
+    return [Message("Certainty by segments: {curve} ({number} taken)", curve=curve, number=model.n_segments_)]
+
+
+def is_certainty(line: str) -> bool:
+    """Whether a line of a model's summary is about certainty."""
+    return line.startswith("Certainty")

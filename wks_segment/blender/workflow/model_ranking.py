@@ -1,16 +1,17 @@
-"""Which of several models fits a character: what the operator and the command line share, and what they say of it."""
+"""Ranking: which of several models fits a character, and what to tell the user about it."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
 
 from ...core import PoseSegmentation, PoseSignature, Ranking, SignatureCache, described_alike, rank
-from ...core.poses.describe import Progress
+from ...core.message import Message, message_of
+from ...core.progress import Progress
 from ..errors import UserError
 from ..props.preferences import model_folder
 from ..scene import poses as reader
@@ -19,137 +20,147 @@ from ..scene.characters import group, selected_meshes
 from ..scene.pose_sources import active_character
 from ..scene.poses import Pose
 from . import model_library, pipeline
-from .live_session import session_of
+from .pipeline import Run
 from .report import Report
+from .stored_messages import as_json, as_text
 
-SAYING = {
-    "sure": "{first} fits, surely",
-    "unsure": "{first} fits best, but unsure: {second} may as well",
-    "nothing fits": "Nothing fits: far from all that {first}, the nearest, learned. Learn a new model",
+VERDICT_TEMPLATES = {
+    "sure": "{first} fits, with certainty",
+    "unsure": "{first} fits best, but not with certainty: {second} may fit as well",
+    "nothing fits": "No model fits; the closest is {first}. Learn a new model",
 }
-"""What a verdict is for a person."""
+"""Message for each verdict of `core.rank`."""
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """A model that may fit, by its name; of the model folder with its file."""
+class NamedModel:
+    """A model to rank, with its name, and its file if it is in the model folder."""
 
     name: str
     model: PoseSegmentation
     path: Path | None = None
 
 
-def said(ranking: Ranking, names: Sequence[str]) -> str:
-    """The verdict on a ranking, given the models' names."""
+def verdict_message(ranking: Ranking, names: Sequence[str]) -> Message:
+    """The verdict of a ranking for the user, given the names of the models."""
     first, second = names[ranking.best.index], names[ranking.ranks[min(1, len(ranking.ranks) - 1)].index]
     if ranking.verdict == "unsure" and first == second:
-        return f"{first} is the only one there is to compare with"
-    return SAYING[ranking.verdict].format(first=first, second=second)
+        return Message("{first} is the only model to compare with", first=first)
+    return Message(VERDICT_TEMPLATES[ranking.verdict], first=first, second=second)
 
 
-def candidates(context: bpy.types.Context, report: Report) -> list[Candidate]:
-    """The models of the scene and of the model folder; one that cannot be read is named in a warning.
+def models_to_rank(context: bpy.types.Context, report: Report) -> list[NamedModel]:
+    """The models of the scene and of the model folder; one that cannot be read is left out with a warning.
 
     Raises
     ------
     UserError
         If there is none.
     """
-    found: list[Candidate] = []
+    models: list[NamedModel] = []
     for name, text in model_library.all_of(context.scene.wks_segment):
         try:
-            found.append(Candidate(name, PoseSegmentation.from_json(text)))
+            models.append(NamedModel(name, PoseSegmentation.from_json(text)))
         except ValueError as error:
-            report.warn(f'The model "{name}" was left out: {error}')
-    found += of_files(model_library.in_folder(model_folder(context)), report)
-    if not found:
+            report.warn(Message('The model "{name}" was left out: {reason}', name=name, reason=message_of(error)))
+    models += models_in_files(model_library.in_folder(model_folder(context)), report)
+    if not models:
         raise UserError("No model yet: learn one, import one, or set Model Folder in the preferences of the add-on")
-    return found
+    return models
 
 
-def of_files(paths: Mapping[str, Path], report: Report) -> list[Candidate]:
-    """The models in files; one that cannot be read is named in a warning."""
-    found = []
+def models_in_files(paths: Mapping[str, Path], report: Report) -> list[NamedModel]:
+    """The models in files by name; one that cannot be read is left out with a warning."""
+    models = []
     for name, path in paths.items():
         try:
-            found.append(Candidate(name, model_library.loaded(path), path))
+            models.append(NamedModel(name, model_library.loaded(path), path))
         except UserError as error:
-            report.warn(f"Left out: {error}")
-    return found
+            report.warn(Message("Left out: {reason}", reason=message_of(error)))
+    return models
 
 
-def rank_poses(
-    candidates: Sequence[Candidate], poses: Sequence[Pose], report: Report, progress: Progress,
-    cache: SignatureCache | None = None, workers: int | None = None,
-) -> Ranking:  # fmt: skip
-    """Say which models fit poses of one character; UserError if a pose cannot be described."""
+def largest(models: Sequence[NamedModel]) -> PoseSegmentation:
+    """The model whose signature takes the most time and memory."""
+    return max((named.model for named in models), key=lambda model: model.n_eigenpairs)
+
+
+def rank_poses(models: Sequence[NamedModel], poses: Sequence[Pose], run: Run) -> Ranking:
+    """Rank models by how well they fit poses of one character; UserError if a pose cannot be described.
+
+    Models with the same signature share the described poses.
+    """
+    fitted = [named.model for named in models]
     described: dict[int, list[PoseSignature]] = {}
-    together = described_alike([candidate.model for candidate in candidates])
-    for number, alike in enumerate(together):
-
-        def tick(stage: str, share: float, begun: int = number) -> None:
-            progress(stage, (begun + share) / len(together))
-
-        works = pipeline.describe(candidates[alike[0]].model, poses, report, tick, cache=cache, workers=workers)
-        described |= {i: [work.pose for work in works] for i in alike}
-    with report.stage("rank"):
-        return rank([candidate.model for candidate in candidates], [described[i] for i in range(len(candidates))])
+    for alike, progress in run.progress.each(described_alike(fitted), "Reading"):
+        signatures = [each.pose for each in pipeline.describe(fitted[alike[0]], poses, run.with_progress(progress))]
+        described |= dict.fromkeys(alike, signatures)
+    with run.report.stage("rank"):
+        return rank(fitted, [described[i] for i in range(len(fitted))])
 
 
 @dataclass
-class RankWork:
-    """The ranking of the active character, made of what was read; nothing but arrays until it is written."""
+class RankingJob:
+    """A job that ranks models for the active character.
 
-    candidates: list[Candidate]
+    Everything that it needs of Blender is read when it is made; `compute` works on arrays only, and `write` brings the
+    result back.
+    """
+
+    models: list[NamedModel]
     poses: list[Pose]
-    watch: Watch
+    guard: Watch
     report: Report
     cache: SignatureCache
-    ranking: Ranking | None = field(default=None)
+    ranking: Ranking | None = None
 
     @classmethod
-    def read(cls, context: bpy.types.Context) -> RankWork:
-        """Read the models, and the active character as it is now; UserError if either cannot be used."""
+    def read(cls, context: bpy.types.Context, cache: SignatureCache) -> RankingJob:
+        """Read the models, and the active character in its current pose; UserError if either cannot be used."""
         report = Report([])
-        model_library.adopt(context.scene.wks_segment)
-        found = candidates(context, report)
+        model_library.list_active(context.scene.wks_segment)
+        models = models_to_rank(context, report)
         with report.stage("read"):
             character = active_character(context, group(selected_meshes(context)))
             report.poses = reader.read_objects(context, [character])
-        watch = Watch(context.scene, [character])
-        return cls(found, report.poses, watch, report, session_of(context).cache)
+        return cls(models, report.poses, Watch(context.scene, [character]), report, cache)
 
     @property
     def model(self) -> PoseSegmentation:
-        """The one whose signature takes most."""
-        return max((each.model for each in self.candidates), key=lambda model: model.n_eigenpairs)
+        """The model that the limits of time and memory are checked for."""
+        return largest(self.models)
 
     def compute(self, progress: Progress) -> None:
-        """Describe and compare; UserError if the core refuses. Fit for a thread."""
-        self.ranking = rank_poses(self.candidates, self.poses, self.report, progress, self.cache)
+        """Describe the character and rank the models; UserError if the core refuses.
 
-    def write(self) -> str:
-        """Let the scene show the ranking; the verdict. ChangedError if what was read has changed."""
-        self.watch.look()
+        Touches nothing of Blender, so that a thread can run it.
+        """
+        self.ranking = rank_poses(self.models, self.poses, Run(self.report, progress, self.cache))
+
+    def write(self) -> Message:
+        """Store the ranking in the scene and return the verdict; ChangedError if the scene has changed."""
+        self.guard.look()
         assert self.ranking is not None
-        settings = self.watch.scene().wks_segment
-        names = [candidate.name for candidate in self.candidates]
+        settings = self.guard.scene().wks_segment
+        names = [named.name for named in self.models]
         settings.ranking.clear()
         for place in self.ranking.ranks:
-            item, candidate = settings.ranking.add(), self.candidates[place.index]
-            item.name, item.path = candidate.name, str(candidate.path or "")
+            item, named = settings.ranking.add(), self.models[place.index]
+            item.name, item.path = named.name, str(named.path or "")
             item.score, item.probability = place.score, place.probability
         character = self.poses[0].character
         settings.ranked = json.dumps([member.name for member in character.members])
-        settings.verdict = f"{character.name}: {said(self.ranking, names)}"
-        verdict: str = settings.verdict
+        verdict = Message(
+            "{character}: {verdict}", character=character.name, verdict=verdict_message(self.ranking, names)
+        )
+        settings.verdict, settings.verdict_messages = as_text([verdict]), as_json([verdict])
         return verdict
 
 
 def ranked_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The objects that were ranked last; UserError if one is gone."""
     names = json.loads(context.scene.wks_segment.ranked or "[]")
-    found = [context.scene.objects.get(name) for name in names]
-    if not found or any(obj is None or obj.type != "MESH" for obj in found):
-        raise UserError("What was ranked is gone: rank anew")
-    return [obj for obj in found if obj is not None]
+    objects = [context.scene.objects.get(name) for name in names]
+    if not objects or any(obj is None or obj.type != "MESH" for obj in objects):
+        raise UserError("The ranked objects are gone: rank the models again")
+    return [obj for obj in objects if obj is not None]

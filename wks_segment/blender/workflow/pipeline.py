@@ -1,20 +1,21 @@
-"""What the operators and the command line do, without either, step by step: describe, learn, label, write.
+"""The steps that the operators and the command line share: describe, learn, label, soften, write.
 
-All but the last know no Blender, and so run in a thread as well; `Wanted` is what they need of it.
+All but `write` work on arrays without Blender, so that a thread can run them; `LabelRequest` is what they need of the
+settings and the scene.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 
 import bpy
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ...core import (
-    Cache,
     Connection,
     PoseSegmentation,
     SignatureCache,
@@ -24,7 +25,8 @@ from ...core import (
     connect,
 )
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
-from ...core.poses.describe import Progress
+from ...core.message import Message, message_of
+from ...core.progress import Progress
 from ...core.segmentation import DESCRIBED
 from ...core.spectral.memory import available_memory
 from ..errors import TooLargeError, UserError
@@ -41,27 +43,54 @@ from ..scene.poses import Pose
 from . import model_library, segment_list
 from .report import Report
 
-CUT = 0.6
-"""Share of the time that labels take where left is told from right, too."""
+SEGMENT_SHARE = 0.6
+"""Share of segments in the progress of labels with sides; the rest tells left from right. A wrong share only makes the
+progress bar uneven."""
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """What the settings ask of labels, and what these are for: all that is read beside poses.
+class Run:
+    """What a computation reports to, and what it may use.
+
+    Attributes
+    ----------
+    report : Report
+        Collects facts and warnings.
+    progress : Progress
+        Told how far the computation is; can end it.
+    cache : optional
+        Signatures computed earlier; new ones are added.
+    workers : int, optional
+        Processes that describe poses, see `PoseSegmentation.describe_all`.
+    """
+
+    report: Report
+    progress: Progress = field(default_factory=Progress)
+    cache: SignatureCache | None = None
+    workers: int | None = None
+
+    def with_progress(self, progress: Progress) -> Run:
+        """The same with another progress, usually a part of this one."""
+        return replace(self, progress=progress)
+
+
+@dataclass(frozen=True)
+class LabelRequest:
+    """Settings of labels, and the meshes that they are for: all that labeling needs beside poses.
 
     Attributes
     ----------
     min_share : float
-        Smallest connected part, as a share of the area.
+        Smallest region, as a share of the area.
     sides : "one" or "two"
     vertex_groups : "none", "hard" or "soft"
     colors, materials, face_sets, seams : bool
         Whether they are written.
     template : str
-        Name of the material that those of parts are copies of; empty: none.
+        Name of the material that materials of parts are copied from; empty for none.
     style : Style
     bodies
-        Of the characters that are labeled.
+        The whole mesh of each character that is labeled.
     """
 
     min_share: float
@@ -76,7 +105,7 @@ class Wanted:
     bodies: dict[Character, Body]
 
     @classmethod
-    def of(cls, settings: WKSSegmentSettings, characters: Iterable[Character]) -> Wanted:
+    def of(cls, settings: WKSSegmentSettings, characters: Iterable[Character]) -> LabelRequest:
         """Read the settings, and the characters' own meshes."""
         return cls(
             settings.min_share / 100,
@@ -101,192 +130,220 @@ def check_limits(model: PoseSegmentation, poses: Sequence[Pose], settings: WKSSe
     allowed = 1e9 * settings.limit_memory or available_memory()
     if seconds <= 60 * settings.limit_minutes and needed <= allowed:
         return
-    most = max(pose.mesh.n_vertices for pose in poses)
     raise TooLargeError(
-        f"{len(poses)} poses of up to {most:,} vertices take about {seconds / 60:,.1f} minutes and {needed / 1e9:,.1f} "
-        f"GB of memory; allowed are {settings.limit_minutes:,.1f} minutes and {allowed / 1e9:,.1f} GB: raise the "
-        "limit, take fewer poses, or learn from a decimated copy and apply the model to this mesh"
+        "{count} poses of up to {vertices:,} vertices take about {minutes:,.1f} minutes and {memory:,.1f} GB of "
+        "memory; allowed are {allowed_minutes:,.1f} minutes and {allowed_memory:,.1f} GB: raise the limit, take fewer "
+        "poses, or learn from a decimated copy and apply the model to this mesh",
+        count=len(poses),
+        vertices=max(pose.mesh.n_vertices for pose in poses),
+        minutes=seconds / 60,
+        memory=needed / 1e9,
+        allowed_minutes=settings.limit_minutes,
+        allowed_memory=allowed / 1e9,
     )
 
 
-def learn(
-    model: PoseSegmentation, poses: Sequence[Pose], report: Report, progress: Progress,
-    cache: Cache | None = None, workers: int | None = None,
-) -> list[Workpiece]:  # fmt: skip
-    """Fit a model to poses; what is known of each pose.
+def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[Workpiece]:
+    """Fit a model to poses; return the described poses.
 
     Raises
     ------
     UserError
         If the core refuses a pose or the model's parameters; the message names it.
     """
-    most = max(int(pose.polygon_of.max()) + 1 for pose in poses)
-    if model.n_segments != "auto" and model.n_segments > most:
+    n_faces = max(int(pose.polygon_of.max()) + 1 for pose in poses)
+    if model.n_segments != "auto" and model.n_segments > n_faces:
         raise UserError(
-            f'"{poses[0].character.name}" has {most} faces, too few for {model.n_segments} segments: '
-            "take fewer segments, or subdivide it"
+            '"{character}" has {faces} faces, too few for {segments} segments: take fewer segments, or subdivide it',
+            character=poses[0].character.name,
+            faces=n_faces,
+            segments=model.n_segments,
         )
-    described = describe(model, poses, report, progress, DESCRIBED, cache, workers)
-    with report.stage("mixture"):
+    described = describe(model, poses, run.with_progress(run.progress.part(0.0, DESCRIBED)))
+    progress = run.progress.titled("Learning the segments")
+    with run.report.stage("mixture"):
         try:
-            model.fit(described, lambda stage, share: progress("Learning the segments", share), poses[0].upright, cache)
+            model.fit(described, progress.report, poses[0].upright, run.cache)
         except ValueError as error:
-            raise UserError(f"The segments could not be learned: {error}") from error
-    report.tell_of(model)
+            raise UserError("The segments could not be learned: {reason}", reason=message_of(error)) from error
+    run.report.add_model(model)
     return described
 
 
-def describe(
-    model: PoseSegmentation, poses: Sequence[Pose], report: Report, progress: Progress, share: float = 1.0,
-    cache: SignatureCache | None = None, workers: int | None = None,
-) -> list[Workpiece]:  # fmt: skip
-    """Signature of each pose, to be labeled; poses that are one and the same surface are computed once.
+def describe(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[Workpiece]:
+    """Describe each pose by its signature, so that it can be labeled.
 
-    What is in the cache is not computed at all.
+    Equal poses are described once, and poses in the cache not at all. Raises UserError if the core refuses a pose.
     """
-    same = [next((j for j in range(i) if pose.is_like(poses[j])), i) for i, pose in enumerate(poses)]
-    new = [i for i, first in enumerate(same) if first == i]
-    with report.stage("connect"):
-        # One surface in all poses of a mesh, also where pieces of it meet in some.
-        connections: dict[int, Connection] = {}
-        for i, pose in enumerate(poses):
-            first = next(j for j, other in enumerate(poses) if pose.is_mesh_of(other))
-            if first == i:
-                progress(f'Seams of "{pose.name}"', 0.0)
-                alike = [other.mesh for other in poses if pose.is_mesh_of(other)]
-                try:
-                    connections[i] = connect(*alike, rest=pose.rest, pieces=model.pieces)
-                except ValueError as error:
-                    raise UserError(f'"{pose.name}": {error}') from error
-            connections[i] = connections[first]
-    with report.stage("signature"):
+    originals = [next((j for j in range(i) if pose.is_like(poses[j])), i) for i, pose in enumerate(poses)]
+    distinct = [i for i, original in enumerate(originals) if original == i]
+    with run.report.stage("connect"):
+        connections = _connections(model, poses, run.progress)
+    with run.report.stage("signature"), _solver_warnings(run.report):
         try:
-            with warnings.catch_warnings(record=True) as said:
-                warnings.simplefilter("always")
-                described = model.describe_all(
-                    [poses[i].mesh for i in new],
-                    [connections[i] for i in new],
-                    lambda stage, done: progress(f"Signature of {stage}", share * done),
-                    [f'"{poses[i].name}"' for i in new],
-                    workers=workers,
-                    cache=cache,
-                )
+            signatures = model.describe_all(
+                [poses[i].mesh for i in distinct],
+                [connections[i] for i in distinct],
+                run.progress.titled("Signature of {stage}").report,
+                [f'"{poses[i].name}"' for i in distinct],
+                workers=run.workers,
+                cache=run.cache,
+            )
         except (ValueError, SpectrumError, MemoryError) as error:
-            raise UserError(str(error)) from error
-        report.warnings += dict.fromkeys(
-            str(warning.message) for warning in said if issubclass(warning.category, SpectrumWarning)
-        )
-        # What others said meanwhile, in Blender's own thread too, is theirs.
-        for warning in said:
-            if not issubclass(warning.category, SpectrumWarning):
-                warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
-    of = dict(zip(new, map(Workpiece, described), strict=True))
-    report.laplacians = [of[first].pose.laplacian for first in same]
-    return [of[first] for first in same]
+            raise UserError(message_of(error)) from error
+    described = dict(zip(distinct, map(Workpiece, signatures), strict=True))
+    run.report.laplacians = [described[original].pose.laplacian for original in originals]
+    return [described[original] for original in originals]
+
+
+def _connections(model: PoseSegmentation, poses: Sequence[Pose], progress: Progress) -> list[Connection]:
+    """Connection of each pose: one surface in all poses of a mesh, also where islands of it meet in some."""
+    connections: list[Connection] = []
+    for i, pose in enumerate(poses):
+        original = next(j for j, other in enumerate(poses) if pose.is_mesh_of(other))
+        if original < i:
+            connections.append(connections[original])
+            continue
+        progress(0.0, Message('Seams of "{pose}"', pose=pose.name))
+        same_mesh = [other.mesh for other in poses if pose.is_mesh_of(other)]
+        try:
+            connections.append(connect(*same_mesh, rest=pose.rest, pieces=model.pieces))
+        except ValueError as error:
+            raise UserError('"{pose}": {reason}', pose=pose.name, reason=message_of(error)) from error
+    return connections
+
+
+@contextmanager
+def _solver_warnings(report: Report) -> Iterator[None]:
+    """Move the eigensolver's warnings in this block to a report, and pass all others on after it."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield
+    report.warnings += dict.fromkeys(
+        message_of(warning.message)
+        for warning in caught
+        if isinstance(warning.message, Warning) and issubclass(warning.category, SpectrumWarning)
+    )
+    # Other code may have warned meanwhile in Blender's own thread.
+    for warning in caught:
+        if not issubclass(warning.category, SpectrumWarning):
+            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
 
 
 def label(
-    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[Workpiece],
-    wanted: Wanted, report: Report, progress: Progress,
-) -> dict[Character, IntArray]:  # fmt: skip
-    """Part of each of a character's polygons, agreed on by all of its poses, and by all objects that share a mesh."""
+    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[Workpiece], request: LabelRequest, run: Run
+) -> dict[Character, IntArray]:
+    """Part of each polygon of each character; one result for all poses and all objects that share a mesh."""
     labels: dict[Character, IntArray] = {}
-    min_share = None if model.preset == "paper" else wanted.min_share
-    cut = CUT if wanted.sides == "two" else 1.0
-    with report.stage("label"):
-        together = of_one_mesh(poses)
-        for number, mine in enumerate(together):
-            character = poses[mine[0]].character
-            body = wanted.bodies[character]
-
-            def of_pose(share: float, number: int = number, name: str = character.name) -> None:
-                progress(f'Labels of "{name}"', (number + cut * share) / len(together))
-
-            found = model.segment_polygons(
-                [described[i] for i in mine],
-                [poses[i].polygon_of for i in mine],
-                min_share,
-                of_pose,
-                marked=body.marked,
-            )
-            if wanted.sides == "two":
-                sides = model.polygon_sides(
-                    [described[i] for i in mine],
-                    [poses[i].polygon_of for i in mine],
-                    found,
-                    lambda share, number=number, name=character.name: progress(
-                        f'Left and right of "{name}"', (number + cut + (1 - cut) * share) / len(together)
-                    ),
-                )
-                found = part_ids.from_segments(found, sides)
-            found = filled(found, body)
-            labels |= {poses[i].character: found for i in mine}
-    report.tell_of_parts(np.concatenate(list(labels.values())))
-    if wanted.sides == "two" and len(report.parts) == report.n_segments:
-        report.warn(
-            "Left and right are not told apart with the method of the paper: parts are one for both sides"
+    with run.report.stage("label"):
+        groups = poses_by_mesh(poses)
+        for i, group in enumerate(groups):
+            character = poses[group[0]].character
+            views = MeshViews([poses[j] for j in group], [described[j] for j in group], request.bodies[character])
+            parts = _parts_of(model, views, request, run.progress.part(i / len(groups), (i + 1) / len(groups)))
+            labels |= {poses[j].character: parts for j in group}
+    run.report.add_labels(np.concatenate(list(labels.values())))
+    if request.sides == "two" and len(run.report.parts) == run.report.n_segments:
+        run.report.warn(
+            "Left and right are not told apart with the method of the paper: both sides are one part"
             if model.sides_ is None
             else "No segment has parts on both sides: does X point to the character's left when it is at rest?"
         )
     return labels
 
 
+@dataclass(frozen=True)
+class MeshViews:
+    """One mesh in all of its poses: the poses, the same described, and the whole mesh."""
+
+    poses: list[Pose]
+    described: list[Workpiece]
+    body: Body
+
+    @property
+    def name(self) -> str:
+        """Name of the character."""
+        return self.poses[0].character.name
+
+    @property
+    def polygons(self) -> list[IntArray]:
+        """For each pose, the polygon of each triangle."""
+        return [pose.polygon_of for pose in self.poses]
+
+
+def _parts_of(model: PoseSegmentation, views: MeshViews, request: LabelRequest, progress: Progress) -> IntArray:
+    """(p,) part of each polygon of a mesh."""
+    two_sides = request.sides == "two"
+    min_share = None if model.preset == "paper" else request.min_share
+    parts = model.segment_polygons(
+        views.described,
+        views.polygons,
+        min_share,
+        progress.part(0.0, SEGMENT_SHARE if two_sides else 1.0, Message('Labels of "{character}"', character=views.name)),
+        marked=views.body.marked,
+    )
+    if two_sides:
+        stage = Message('Left and right of "{character}"', character=views.name)
+        sides = model.polygon_sides(views.described, views.polygons, parts, progress.part(SEGMENT_SHARE, 1.0, stage))
+        parts = part_ids.from_segments(parts, sides)
+    return filled(parts, views.body)
+
+
 def soften(
     model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[Workpiece],
-    labels: dict[Character, IntArray], wanted: Wanted, report: Report, progress: Progress,
+    labels: dict[Character, IntArray], request: LabelRequest, run: Run,
 ) -> dict[Character, dict[int, FloatArray]] | None:  # fmt: skip
-    """For each part the weights of each character's vertices, agreed on as labels are.
+    """Weights of each part at each character's vertices, one result for all poses of a mesh as in `label`.
 
-    None if no soft groups are asked for.
+    None if the request is not for soft vertex groups.
     """
-    if wanted.vertex_groups != "soft":
+    if request.vertex_groups != "soft":
         return None
     weights: dict[Character, dict[int, FloatArray]] = {}
-    with report.stage("label"):
-        together = of_one_mesh(poses)
-        for number, mine in enumerate(together):
-            character = poses[mine[0]].character
-            body = wanted.bodies[character]
-
-            def of_pose(share: float, number: int = number, name: str = character.name) -> None:
-                progress(f'Weights of "{name}"', (number + share) / len(together))
-
-            found = soft_weights(model, [poses[i] for i in mine], [described[i] for i in mine], body, of_pose)
-            of_parts = by_parts(found, labels[character], body)
-            weights |= {poses[i].character: of_parts for i in mine}
+    with run.report.stage("label"):
+        groups = poses_by_mesh(poses)
+        for i, group in enumerate(groups):
+            character = poses[group[0]].character
+            body = request.bodies[character]
+            stage = Message('Weights of "{character}"', character=character.name)
+            progress = run.progress.part(i / len(groups), (i + 1) / len(groups), stage)
+            of_segments = soft_weights(model, [poses[j] for j in group], [described[j] for j in group], body, progress)
+            of_parts = by_parts(of_segments, labels[character], body)
+            weights |= {poses[j].character: of_parts for j in group}
     return weights
 
 
-def of_one_mesh(poses: Sequence[Pose]) -> list[list[int]]:
-    """Indices of poses whose characters share their meshes, together."""
+def poses_by_mesh(poses: Sequence[Pose]) -> list[list[int]]:
+    """Groups of indices of poses whose characters share their meshes."""
     meshes = [pose.character.meshes for pose in poses]
     return [[i for i, other in enumerate(meshes) if other == mesh] for mesh in dict.fromkeys(meshes)]
 
 
 def write(
-    settings: WKSSegmentSettings, labels: dict[Character, IntArray], wanted: Wanted, report: Report,
-    soft: dict[Character, dict[int, FloatArray]] | None = None, renumbered: bool = False,
+    settings: WKSSegmentSettings, labels: dict[Character, IntArray], request: LabelRequest, report: Report,
+    weights: dict[Character, dict[int, FloatArray]] | None = None, renumbered: bool = False,
 ) -> None:  # fmt: skip
-    """Write labels, and the weights that `soften` gave, to the objects of each character, with the user's edits.
+    """Write labels with the user's edits, and the weights from `soften`, to the objects of each character.
 
-    If parts may have other numbers than those that are on the objects now, since the model is new, the edits follow.
+    If a new model may number parts differently from the labels on the objects (`renumbered`), the user's names, colors
+    and faces by hand are carried over first.
     """
-    if soft is None and wanted.vertex_groups == "soft":
-        report.warn("The vertex groups are hard: only a model says how probable a segment is (Apply to Selected)")
+    if weights is None and request.vertex_groups == "soft":
+        report.warn("The vertex groups are hard: only a model gives the probabilities of soft ones (Apply to Selected)")
     if renumbered:
         segment_list.carry_over(settings, labels)
     notes, style, written = settings.notes(), settings.style(), [np.zeros(0, dtype=np.int64)]
-    template = bpy.data.materials.get(wanted.template)
+    template = bpy.data.materials.get(request.template)
     with report.stage("write"):
-        for character, values in labels.items():
+        for character, parts in labels.items():
             ranges = zip(reader.polygon_ranges(character), reader.vertex_ranges(character), strict=True)
             for (obj, polygons), (_, vertices) in ranges:
                 if polygons.stop == polygons.start:
                     continue
-                weights = None if soft is None else {part: of[vertices] for part, of in soft[character].items()}
+                own = None if weights is None else {part: w[vertices] for part, w in weights[character].items()}
                 final = write_edited(
-                    obj.data, values[polygons], style, notes.joined, wanted.colors, wanted.materials, weights,
-                    wanted.vertex_groups != "none" and soft is None, wanted.face_sets, wanted.seams, template,
+                    obj.data, parts[polygons], style, notes.joined, request.colors, request.materials, own,
+                    request.vertex_groups != "none" and weights is None, request.face_sets, request.seams, template,
                 )  # fmt: skip
                 written.append(final)
         segment_list.fill(settings)
@@ -301,10 +358,10 @@ def stored_model(settings: WKSSegmentSettings) -> PoseSegmentation:
 
 
 def filled(labels: IntArray, body: Body) -> IntArray:
-    """Labels for all polygons of a body: one that is not seen (masked out, say) takes that of the nearest one."""
+    """(p,) labels of all polygons of a body: one without a label, masked out for example, takes the nearest one's."""
     places = body.polygons
     labels = np.concatenate([labels, np.full(len(places) - len(labels), -1)])
-    unseen = labels < 0
-    if unseen.any():
-        labels[unseen] = labels[~unseen][cKDTree(places[~unseen]).query(places[unseen])[1]]
+    missing = labels < 0
+    if missing.any():
+        labels[missing] = labels[~missing][cKDTree(places[~missing]).query(places[missing])[1]]
     return labels

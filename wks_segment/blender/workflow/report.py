@@ -1,4 +1,4 @@
-"""What happened: for the status bar, the terminal and `--json`."""
+"""What a run has done: for the status bar, the terminal and `--json`."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from ...core import PoseSegmentation
 from ...core.mesh.triangle_mesh import IntArray
+from ...core.message import Message
 from ..parts import part_ids
 from ..scene.poses import Pose
 from .certainty import certainties, certainty_lines
@@ -18,7 +19,27 @@ from .certainty import certainties, certainty_lines
 
 @dataclass
 class Report:
-    """Poses, what was found on them, seconds, and what the user should know."""
+    """Poses, the segments found on them, seconds, and what the user should know.
+
+    Attributes
+    ----------
+    poses
+        The poses that were read.
+    laplacians
+        For each pose, which triangles its spectrum is computed on.
+    n_segments : int
+        Segments of the model, or those that occur on the poses, once labeled.
+    parts
+        Number of each part that occurs, by name.
+    certainty
+        Certainty by number of segments; None if the model tells none.
+    seconds
+        Time by stage.
+    notes
+        Facts to show.
+    warnings
+        Problems that did not stop the run.
+    """
 
     poses: list[Pose]
     laplacians: list[str] = field(default_factory=list)
@@ -29,51 +50,64 @@ class Report:
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
-    def tell_of(self, model: PoseSegmentation) -> None:
-        """Say how many segments a fitted model has, and how certain it is of each number."""
+    def add_model(self, model: PoseSegmentation) -> None:
+        """Record how many segments a fitted model has, and how certain it is of each number."""
         self.n_segments, self.certainty = model.n_segments_, certainties(model)
         self.notes = certainty_lines(model)
 
-    def tell_of_parts(self, labels: IntArray) -> None:
-        """Say which parts there are among labels."""
+    def add_labels(self, labels: IntArray) -> None:
+        """Record which parts occur among labels."""
         occurring = part_ids.unique_parts(labels)
         self.n_segments = len(np.unique(part_ids.segments_of(np.array(occurring))))
         self.parts = {part_ids.default_name(part): part for part in occurring}
 
     def warn(self, text: str) -> None:
-        """Warn of something, once."""
+        """Add a warning, unless it is there already."""
         self.warnings = list(dict.fromkeys([*self.warnings, text]))
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
-        """Add the time of a block to a stage."""
+        """Add the time that the block takes to a stage."""
         start = time.perf_counter()
         yield
         self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
 
     @property
     def facts(self) -> list[str]:
-        """What a person wants to know, short."""
+        """Short facts for the user: poses, vertices, segments, improved triangles, seconds."""
+        improved = self.laplacians.count("delaunay")
         return [
-            "1 pose" if len(self.poses) == 1 else f"{len(self.poses)} poses",
-            f"{sum(pose.mesh.n_vertices for pose in self.poses):,} vertices",
+            Message("1 pose") if len(self.poses) == 1 else Message("{count} poses", count=len(self.poses)),
+            Message("{count:,} vertices", count=sum(pose.mesh.n_vertices for pose in self.poses)),
             part_ids.count_text(self.n_segments, len(self.parts)),
-            *([f"better triangles for {improved}"] if (improved := self.laplacians.count("delaunay")) else []),
-            f"{sum(self.seconds.values()):.1f} seconds",
+            *([Message("better triangles for {count}", count=improved)] if improved else []),
+            Message("{seconds:.1f} seconds", seconds=sum(self.seconds.values())),
         ]
 
 
 def segment_warnings(model: PoseSegmentation, report: Report) -> list[str]:
-    """What the user should know of the segments that were found."""
+    """Warning that segments of the model do not occur on any pose; none if all occur."""
     lost = model.n_segments_ - report.n_segments
-    return [f"{lost} of {model.n_segments_} segments are gone: all of their parts were too small"] if lost > 0 else []
+    if lost <= 0:
+        return []
+    return [
+        Message(
+            "{lost} of {count} segments are gone: all of their parts were too small", lost=lost, count=model.n_segments_
+        )
+    ]
 
 
 def pose_warnings(poses: Sequence[Pose], from_frames: bool) -> list[str]:
-    """What the user should know of the poses that were learned from."""
+    """Warnings that the poses to learn from are too few or all the same."""
     if len(poses) == 1:
-        return ["Learned from one pose only: parts are more reliable with three to five"]
+        return ["Learned from one pose only: segments are more reliable with three to five"]
     if all(pose.is_like(poses[0]) for pose in poses[1:]):
-        hint = "does an animation move the character in these frames?" if from_frames else "pose them differently"
-        return [f"All {len(poses)} poses are the same: {hint}"]
+        if from_frames:
+            return [
+                Message(
+                    "All {count} poses are the same: does an animation move the character in these frames?",
+                    count=len(poses),
+                )
+            ]
+        return [Message("All {count} poses are the same: pose them differently", count=len(poses))]
     return []

@@ -1,4 +1,4 @@
-"""The paper's retrieval on a folder of classes: some shapes of each are learned, the others asked for."""
+"""The paper's retrieval experiment on a folder of classes: learn some shapes of each, and ask for the class of others."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pathlib import Path
 
 import bpy
 
-from ...core import Cache, PoseSegmentation, PoseSignature, Retrieval, retrieve
-from ...core.poses.describe import Progress
+from ...core import PoseSegmentation, PoseSignature, Retrieval, retrieve
+from ...core.message import Message, message_of
 from ...core.ranking import spread_evenly
 from ..errors import UserError
 from ..props.settings import WKSSegmentSettings
@@ -18,92 +18,117 @@ from ..scene import poses as reader
 from ..scene.characters import group, mesh_objects
 from ..scene.poses import Pose
 from . import pipeline
+from .pipeline import Run
 from .report import Report
 
+LEARN_CLASS_SHARE = 0.6
+"""Share of a class's progress that learning takes; the rest describes the shapes that are asked for."""
 
-def evaluate(
-    folder: Path,
-    settings: WKSSegmentSettings,
-    n_learned: int,
-    n_frames: int,
-    report: Report,
-    progress: Progress,
-    cache: Cache | None = None,
-) -> Retrieval:
-    """Learn a model of each class in a folder, and ask for the class of what was not learned.
+
+def evaluate(folder: Path, settings: WKSSegmentSettings, n_learned: int, n_frames: int, run: Run) -> Retrieval:
+    """Learn a model of each class in a folder, and find the class of the shapes that were not learned.
 
     A sub-folder is a class, and each file in it a shape; an animated file beside it is a class, and frames of its
-    animation are the shapes. What cannot be read is named in a warning, and left out.
+    animation are the shapes. Files and classes that cannot be used are left out with a warning.
+
+    Parameters
+    ----------
+    folder
+    settings
+        For all models; opening a file may change them, so that they are read once.
+    n_learned : int
+        Shapes of each class to learn.
+    n_frames : int
+        Frames to take from an animated file.
+    run : Run
 
     Raises
     ------
     UserError
-        If fewer than two classes are left, or the settings exclude each other.
+        If fewer than two classes can be used, or the settings exclude each other.
     """
     models: dict[str, PoseSegmentation] = {}
     queries: dict[str, list[PoseSignature]] = {}
-    # Opening a file takes the settings away.
-    unfitted, limits, found = settings.new_model(), (settings.limit_minutes, settings.limit_memory), _classes(folder)
-    for number, (name, paths) in enumerate(found):
-
-        def tick(stage: str, share: float, begun: int = number, name: str = name) -> None:
-            progress(f"{name}: {stage}", (begun + share) / len(found))
-
+    unfitted, limits = settings.new_model(), (settings.limit_minutes, settings.limit_memory)
+    for (name, paths), progress in run.progress.each(_classes(folder), "Reading"):
         model = copy(unfitted)
+        class_run = run.with_progress(progress.titled("{name}: {stage}", name=name))
         try:
-            with report.stage("read"):
-                poses = _frames_of(paths[0], n_frames) if folder == paths[0].parent else _shapes_of(paths, report)
-            if len(poses) <= n_learned:
-                raise UserError(
-                    f"there are {len(poses)} shapes that can be used; {n_learned} are learned, and one at least is "
-                    "asked for"
-                )
-            now = bpy.context.scene.wks_segment
-            now.limit_minutes, now.limit_memory = limits
-            pipeline.check_limits(model, poses, now)
-            learned = spread_evenly(len(poses), n_learned)
-            pipeline.learn(
-                model, [poses[i] for i in learned], report, lambda stage, share: tick(stage, 0.6 * share), cache
-            )
-            asked = [pose for i, pose in enumerate(poses) if i not in learned]
-            described = []
-            for i, pose in enumerate(asked):
-                tick(f"Signature of {pose.name}", 0.6 + 0.4 * i / len(asked))
-                described += pipeline.describe(model, [pose], report, lambda stage, share: None, cache=cache)
+            with run.report.stage("read"):
+                is_animation = folder == paths[0].parent
+                poses = _frames_of(paths[0], n_frames) if is_animation else _shapes_of(paths, run.report)
+            _check_class(model, poses, n_learned, limits)
+            queries[name] = _learn_class(model, poses, n_learned, class_run)
         except UserError as error:
-            report.warn(f"The class {name} was left out: {error}")
+            run.report.warn(
+                Message("The class {name} was left out: {reason}", name=name, reason=message_of(error))
+            )
             continue
-        models[name], queries[name] = model, [work.pose for work in described]
+        models[name] = model
     if len(models) < 2:
-        raise UserError(
-            f"{folder}: there are {len(models)} classes that can be used, and at least two are needed: sub-folders "
-            "with a file a shape, or animated files" + "".join(f"; {warning}" for warning in report.warnings)
-        )
-    with report.stage("rank"):
+        reasons = [
+            Message(
+                "{folder}: there are {count} classes that can be used, and at least two are needed: sub-folders with "
+                "one shape in each file, or animated files",
+                folder=folder,
+                count=len(models),
+            ),
+            *run.report.warnings,
+        ]
+        raise UserError(Message.joined("; ", reasons))
+    with run.report.stage("rank"):
         return retrieve(models, queries)
 
 
+def _check_class(
+    model: PoseSegmentation, poses: list[Pose], n_learned: int, limits: tuple[float, float]
+) -> None:
+    """UserError if there are too few shapes, or they are too large for the limits of minutes and memory."""
+    if len(poses) <= n_learned:
+        raise UserError(
+            "there are {count} shapes that can be used, but {learned} are learned and at least one more is needed",
+            count=len(poses),
+            learned=n_learned,
+        )
+    settings = bpy.context.scene.wks_segment
+    settings.limit_minutes, settings.limit_memory = limits
+    pipeline.check_limits(model, poses, settings)
+
+
+def _learn_class(model: PoseSegmentation, poses: list[Pose], n_learned: int, run: Run) -> list[PoseSignature]:
+    """Fit the model to some of the poses; return the others described."""
+    learned = spread_evenly(len(poses), n_learned)
+    with run.progress.step(LEARN_CLASS_SHARE) as progress:
+        pipeline.learn(model, [poses[i] for i in learned], run.with_progress(progress))
+    asked = [pose for i, pose in enumerate(poses) if i not in learned]
+    described = []
+    for pose, progress in run.progress.each(asked):
+        # Each alone: poses of one mesh that are described together share a connection, which a query must not.
+        described += pipeline.describe(model, [pose], run.with_progress(progress))
+    return [each.pose for each in described]
+
+
 def _classes(folder: Path) -> list[tuple[str, list[Path]]]:
-    """(name, files) of each class, in the order that a person would give them."""
+    """(name, files) of each class, in natural order."""
     if not folder.is_dir():
-        raise UserError(f"{folder}: there is no such folder")
-    found: list[tuple[str, list[Path]]] = []
-    for path in sorted(folder.iterdir(), key=_natural):
+        raise UserError("{folder}: there is no such folder", folder=folder)
+    classes: list[tuple[str, list[Path]]] = []
+    for path in sorted(folder.iterdir(), key=_natural_order):
         if path.is_dir():
-            shapes = [shape for shape in sorted(path.iterdir(), key=_natural) if _known(shape)]
+            shapes = [shape for shape in sorted(path.iterdir(), key=_natural_order) if _can_import(shape)]
             if shapes:
-                found.append((path.name, shapes))
-        elif _known(path):
-            found.append((path.stem, [path]))
-    return found
+                classes.append((path.name, shapes))
+        elif _can_import(path):
+            classes.append((path.stem, [path]))
+    return classes
 
 
-def _known(path: Path) -> bool:
+def _can_import(path: Path) -> bool:
     return path.suffix.lower() in file_formats.IMPORTERS
 
 
-def _natural(path: Path) -> list[tuple[int, str]]:
-    """So that 2 comes before 10."""
+def _natural_order(path: Path) -> list[tuple[int, str]]:
+    """Sort key by which 2 comes before 10."""
     return [(int(word), "") if word.isdigit() else (-1, word) for word in re.split(r"(\d+)", path.name.lower()) if word]
 
 
@@ -115,14 +140,14 @@ def _shapes_of(paths: list[Path], report: Report) -> list[Pose]:
             (objects,) = file_formats.open_files([path])
             (pose,) = reader.read_objects(bpy.context, group(mesh_objects(objects), together=True))
         except UserError as error:
-            report.warn(f"{path.name} was left out: {error}")
+            report.warn(Message("{file} was left out: {reason}", file=path.name, reason=message_of(error)))
             continue
         poses.append(pose)
     return poses
 
 
 def _frames_of(path: Path, count: int) -> list[Pose]:
-    """Frames spread over the animation in a file."""
+    """Poses at frames spread evenly over the animation in a file."""
     (objects,) = file_formats.open_files([path])
     (character,) = group(mesh_objects(objects), together=True)
     return reader.read_frames(bpy.context, character, reader.own_frames(bpy.context.scene, character, count))

@@ -1,11 +1,10 @@
-"""The list of segments: what stands in it, what a person notes on them, and how the meshes follow."""
+"""The list of segments: its rows, the names and colors that the user gives, and how the meshes follow."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
@@ -21,31 +20,30 @@ from ..outputs.vertex_groups import rename_group
 from ..parts import part_ids
 from ..parts.palette import most_different
 from ..parts.part_style import Style
+from ..props.settings import WKSSegmentSettings
 from ..scene.attributes import read_bools, read_floats, write_attribute
 from ..scene.characters import Character, mesh_objects, with_rigged
 from ..scene.poses import polygon_ranges
 from ..scene.topology import at_corners
 
-if TYPE_CHECKING:
-    from ..props.settings import WKSSegmentSettings
-
-SAME = 0.5
-"""Share of two parts' common area above which one of a new model is the other of the old one. Only one can be."""
+SUCCESSOR_OVERLAP = 0.5
+"""Common area of an old and a new part, as a share of what they cover together, above which the new part is the old
+one's successor. At one half or more a part has at most one successor."""
 
 
 def labeled(settings: WKSSegmentSettings, everywhere: bool = False) -> list[bpy.types.Object]:
-    """Objects of the scene with labels: those in Edit Mode, or the selected ones, or all if there are none of either.
+    """Objects of the scene with labels: those in Edit Mode, or else the selected ones, or else all.
 
-    All, too, if all are asked for.
+    With `everywhere` always all of them.
     """
-    ours = [obj for obj in settings.id_data.objects if obj.type == "MESH" and has_labels(obj.data)]
-    found = [obj for obj in mesh_objects(ours) if obj.library is None and obj.data.library is None]
+    with_labels = [obj for obj in settings.id_data.objects if obj.type == "MESH" and has_labels(obj.data)]
+    local = [obj for obj in mesh_objects(with_labels) if obj.library is None and obj.data.library is None]
     if everywhere:
-        return found
-    in_edit_mode = [obj for obj in found if obj.mode == "EDIT"]
+        return local
+    in_edit_mode = [obj for obj in local if obj.mode == "EDIT"]
     objects = settings.id_data.objects
-    chosen = with_rigged((obj for obj in objects if obj.select_get()), (obj for obj in objects if obj.visible_get()))
-    return in_edit_mode or [obj for obj in found if obj in chosen] or found
+    selected = with_rigged((obj for obj in objects if obj.select_get()), (obj for obj in objects if obj.visible_get()))
+    return in_edit_mode or [obj for obj in local if obj in selected] or local
 
 
 def meshes_of(objects: list[bpy.types.Object]) -> list[bpy.types.Mesh]:
@@ -54,49 +52,49 @@ def meshes_of(objects: list[bpy.types.Object]) -> list[bpy.types.Mesh]:
 
 
 def fill(settings: WKSSegmentSettings) -> None:
-    """List the segments that the labeled objects have now, with their shares of the area; the active one stays."""
+    """List the parts on the labeled objects with their shares of the area. The active part stays active."""
     active = active_part(settings)
     area: dict[int, float] = {}
-    seen: dict[int, bool] = {}
+    visible: dict[int, bool] = {}
     settings.faces_by_hand = 0
     for obj in labeled(settings):
         labels = labels_on(obj.data)
         if labels is None:
             continue
-        # An object's scale counts, since a character's objects can have different ones.
+        # An object's scale counts, since the objects of a character can have different ones.
         scale = abs(np.linalg.det(np.array(obj.matrix_world)[:3, :3])) ** (2 / 3)
         areas = scale * read_floats(obj.data.polygons, "area")
         shown = ~read_bools(obj.data.polygons, "hide")
         for part in np.unique(labels).tolist():
-            mine = labels == part
-            area[part] = area.get(part, 0.0) + float(areas[mine].sum())
-            seen[part] = seen.get(part, False) or bool(shown[mine].any())
+            in_part = labels == part
+            area[part] = area.get(part, 0.0) + float(areas[in_part].sum())
+            visible[part] = visible.get(part, False) or bool(shown[in_part].any())
         settings.faces_by_hand += int((by_hand(obj.data) >= 0).sum())
     total = sum(area.values()) or 1.0
     settings.segments.clear()
     for part in part_ids.unique_parts(np.array(list(area), dtype=np.int64)):
         item = settings.segments.add()
-        item.number, item.share, item.hidden = part, 100 * area[part] / total, not seen[part]
+        item.number, item.share, item.hidden = part, 100 * area[part] / total, not visible[part]
         if part == active:
             settings.active_segment = len(settings.segments) - 1
     settings.active_segment = max(min(settings.active_segment, len(settings.segments) - 1), 0)
 
 
 def active_part(settings: WKSSegmentSettings) -> int | None:
-    """Number of the segment that is active in the list; None if the list is empty."""
+    """Number of the active part in the list; None if the list is empty."""
     index = settings.active_segment
     return settings.segments[index].number if index < len(settings.segments) else None
 
 
 def activate(settings: WKSSegmentSettings, part: int) -> None:
-    """Make a segment of the list the active one."""
+    """Make a part the active one, if it is in the list."""
     numbers = [item.number for item in settings.segments]
     if part in numbers:
         settings.active_segment = numbers.index(part)
 
 
 def rewrite_all(settings: WKSSegmentSettings, objects: list[bpy.types.Object] | None = None) -> None:
-    """Write the labels of objects (None: of all in the scene) anew with the edits of now, and list them."""
+    """Write the labels of objects (None: of all in the scene) again with the user's current edits, and list them."""
     notes = settings.notes()
     for mesh in meshes_of(labeled(settings, everywhere=True) if objects is None else objects):
         rewrite(mesh, settings.style(), notes.joined)
@@ -104,38 +102,37 @@ def rewrite_all(settings: WKSSegmentSettings, objects: list[bpy.types.Object] | 
 
 
 def rename(settings: WKSSegmentSettings, part: int, name: str) -> None:
-    """Call a part by a name, and what it is on the other side by the same with the other suffix, everywhere.
+    """Rename a part and its other side, with the suffix of each side, wherever their names are written.
 
-    A name that another part has gets a number. An empty one gives back the part's own.
+    A name that another part has gets a number. An empty name restores the default.
     """
     notes, style = settings.notes(), settings.style()
     siblings = part_ids.siblings_of(part)
     numbers = {*notes.names, *(item.number for item in settings.segments)} - set(siblings)
     taken = {style.name_of(number) for number in numbers}
     base = "".join(letter for letter in name if letter.isprintable()).strip()
-    wanted = {sibling: _suffixed(base, sibling) for sibling in siblings}
+    new_names = {sibling: _suffixed(base, sibling) for sibling in siblings}
     repeated = 1
-    while base and taken & set(wanted.values()):
+    while base and taken & set(new_names.values()):
         repeated += 1
-        wanted = {
-            sibling: _suffixed(base, sibling, f"{'.' if base[-1].isdigit() else ' '}{repeated}") for sibling in siblings
-        }
-    others = {number: other for number, other in notes.names.items() if number not in siblings}
-    names = {sibling: new for sibling, new in wanted.items() if base and new != part_ids.default_name(sibling)}
-    settings.keep_notes(replace(notes, names=others | names))
+        number = f"{'.' if base[-1].isdigit() else ' '}{repeated}"
+        new_names = {sibling: _suffixed(base, sibling, number) for sibling in siblings}
+    other_names = {number: other for number, other in notes.names.items() if number not in siblings}
+    names = {sibling: new for sibling, new in new_names.items() if base and new != part_ids.default_name(sibling)}
+    settings.keep_notes(replace(notes, names=other_names | names))
     for sibling in siblings:
         restyle(settings, sibling, color=False)
 
 
 def recolor(settings: WKSSegmentSettings, part: int, color: tuple[float, float, float]) -> None:
-    """Give a part a color, everywhere."""
+    """Give a part a color wherever its color is written."""
     notes = settings.notes()
     settings.keep_notes(replace(notes, colors={**notes.colors, part: color}))
     restyle(settings, part, name=False)
 
 
 def restyle(settings: WKSSegmentSettings, part: int, name: bool = True, color: bool = True) -> None:
-    """Let the name or the color of a part, where it is written, be that of now."""
+    """Write the current name or color of a part wherever it is written already."""
     style = settings.style()
     meshes = meshes_of(labeled(settings, everywhere=True))
     for mesh in meshes if name else ():
@@ -152,15 +149,15 @@ def restyle(settings: WKSSegmentSettings, part: int, name: bool = True, color: b
 
 
 def make_part(settings: WKSSegmentSettings, name: str, side: int = 0) -> int:
-    """A new part of that name (or one with a number), in a color that is far from all others; gives its number."""
+    """Add a part with this name and a color that is far from all others; return its number."""
     notes, style = settings.notes(), settings.style()
     taken = {item.number for item in settings.segments} | notes.names.keys() | notes.joined.keys()
     for mesh in meshes_of(labeled(settings, everywhere=True)):
         taken |= set(np.unique(by_hand(mesh)).tolist())
     taken.discard(-1)
     part = part_ids.free_part(taken, side)
-    used = {item.number for item in settings.segments} | notes.colors.keys()
-    color = most_different(style.colors_of(np.array(sorted(used), dtype=np.int64)))
+    colored = {item.number for item in settings.segments} | notes.colors.keys()
+    color = most_different(style.colors_of(np.array(sorted(colored), dtype=np.int64)))
     red, green, blue = color.tolist()
     settings.keep_notes(replace(notes, colors={**notes.colors, part: (red, green, blue)}))
     rename(settings, part, name)
@@ -168,31 +165,32 @@ def make_part(settings: WKSSegmentSettings, name: str, side: int = 0) -> int:
 
 
 def carry_over(settings: WKSSegmentSettings, labels: Mapping[Character, IntArray]) -> None:
-    """Let names, colors and what is by hand follow the parts from an old model's numbers to those of a new one.
+    """Carry names, colors and faces by hand over from the parts of an old model to their successors in a new one.
 
-    To be called with the new labels, before they are written. A part is another one's successor if it covers more than
-    half of what the two cover. What was given by hand to a part without a successor is a part of its own from then on.
+    Call it with the new labels before they are written. A part's successor covers more than half of the area that the
+    two cover together. Faces by hand of a part without a successor become a new part.
     """
     notes, style = settings.notes(), settings.style()
-    given = {mesh: by_hand(mesh) for mesh in meshes_of(labeled(settings, everywhere=True))}
-    present = {part for found in given.values() for part in np.unique(found[found >= 0]).tolist()}
-    new = _successors(labels) | {part: part for part in present if part % part_ids.SIDE_STEP >= part_ids.FIRST_MADE}
+    by_hand_on = {mesh: by_hand(mesh) for mesh in meshes_of(labeled(settings, everywhere=True))}
+    present = {part for parts in by_hand_on.values() for part in np.unique(parts[parts >= 0]).tolist()}
+    made = {part: part for part in present if part % part_ids.SIDE_STEP >= part_ids.FIRST_MADE}
+    new = _successors(labels) | made
     settings.keep_notes(
         PartNotes(
             {new[part]: name for part, name in notes.names.items() if part in new},
             {new[part]: color for part, color in notes.colors.items() if part in new},
-            {new[part]: new[other] for part, other in notes.joined.items() if part in new and other in new},
+            {new[part]: new[into] for part, into in notes.joined.items() if part in new and into in new},
         )
     )
     for part in sorted(present - new.keys()):
         new[part] = make_part(settings, style.name_of(part), part // part_ids.SIDE_STEP)
-    for mesh, found in given.items():
-        if (found >= 0).any():
-            keep_by_hand(mesh, np.array([new.get(part, -1) for part in found.tolist()]))
+    for mesh, parts in by_hand_on.items():
+        if (parts >= 0).any():
+            keep_by_hand(mesh, np.array([new.get(part, -1) for part in parts.tolist()]))
 
 
 def _successors(labels: Mapping[Character, IntArray]) -> dict[int, int]:
-    """For each part that is on meshes now, the one that takes its place among new labels, if there is one."""
+    """Successor among new labels of each part that is on the meshes and has one."""
     before, after, areas = [], [], []
     for character, new in labels.items():
         for obj, polygons in polygon_ranges(character):
@@ -208,39 +206,39 @@ def _successors(labels: Mapping[Character, IntArray]) -> dict[int, int]:
     common = np.zeros((len(old_parts), len(new_parts)))
     np.add.at(common, (row.ravel(), column.ravel()), np.concatenate(areas))
     either = common.sum(axis=1, keepdims=True) + common.sum(axis=0) - common
-    rows, columns = np.nonzero(common > SAME * either)
+    rows, columns = np.nonzero(common > SUCCESSOR_OVERLAP * either)
     return dict(zip(old_parts[rows].tolist(), new_parts[columns].tolist(), strict=True))
 
 
 @contextmanager
 def object_mode(context: bpy.types.Context) -> Iterator[None]:
-    """Leave Edit Mode while the block lasts: only outside it attributes can be read and written as a whole."""
+    """Leave Edit Mode for the block, because Blender reads and writes whole attributes only outside it."""
     if context.mode != "EDIT_MESH":
         yield
         return
-    edited_objects = list(context.objects_in_mode)
+    edited = list(context.objects_in_mode)
     selected = {obj: obj.select_get() for obj in context.view_layer.objects}
     bpy.ops.object.mode_set(mode="OBJECT")
     try:
         yield
     finally:
-        # Blender enters Edit Mode with all that is selected.
+        # Blender enters Edit Mode with all selected objects.
         for obj in selected:
-            obj.select_set(obj in edited_objects)
+            obj.select_set(obj in edited)
         bpy.ops.object.mode_set(mode="EDIT")
-        for obj, was in selected.items():
-            obj.select_set(was)
+        for obj, was_selected in selected.items():
+            obj.select_set(was_selected)
 
 
 def _suffixed(base: str, part: int, number: str = "") -> str:
-    """A name with the suffix of the part's side behind the number, not too long."""
+    """A name with a number and the suffix of the part's side, shortened if it is too long."""
     suffix = part_ids.SIDE_SUFFIXES[part // part_ids.SIDE_STEP]
     base = part_ids.without_side(base) if suffix else base
     return base[: LONGEST_NAME - len(number) - len(suffix)].rstrip() + number + suffix
 
 
 def _recolor_faces(mesh: bpy.types.Mesh, part: int, style: Style) -> None:
-    """Give the corners of a part's faces its color, where colors were written."""
+    """Write the color of a part to the corners of its faces, if the mesh has our color attribute."""
     labels, colors = labels_on(mesh), mesh.color_attributes.get(note_of(mesh).get("colors", ""))
     if labels is None or colors is None:
         return

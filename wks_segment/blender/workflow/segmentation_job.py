@@ -1,4 +1,4 @@
-"""What Learn and Segment and Apply to Selected do, in three steps: read, compute without Blender, write."""
+"""Learn and Segment and Apply to Selected in three steps: read, compute without Blender, write."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import bpy
 
 from ...core import Cache, PoseSegmentation, Workpiece
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
-from ...core.poses.describe import Progress
+from ...core.message import Message, message_of
+from ...core.progress import Progress
 from ..errors import UserError
 from ..props.settings import WKSSegmentSettings
 from ..scene import poses as reader
@@ -20,71 +21,76 @@ from ..scene.characters import Character, group, mesh_objects, selected_meshes
 from ..scene.pose_sources import read_training_poses
 from ..scene.poses import Pose
 from . import model_library, pipeline
-from .live_session import session_of
-from .pipeline import Wanted
+from .pipeline import LabelRequest, Run
 from .report import Report, pose_warnings, segment_warnings
 
-LEARNED, DESCRIBED = 0.9, 0.6
-"""Share of the work that is done when labeling begins: in learning, and in applying."""
-LABELED = 0.7
-"""Share of the rest that is labeling, not soft weights."""
+LEARN_SHARE, DESCRIBE_SHARE = 0.9, 0.6
+"""Share of the progress bar before labeling, when a model is learned and when one is applied: learning takes longer.
+Wrong shares only make the bar and the time left uneven."""
+LABEL_SHARE = 0.7
+"""Share of labels in the rest of the bar; soft weights get what remains."""
 
 
 @dataclass
-class Work:
-    """One job: made of what was read, and then nothing but arrays until it is written.
+class SegmentationJob:
+    """A job that labels meshes by a model, and learns the model first if asked to.
+
+    Everything that it needs of Blender is read when it is made; `compute` works on arrays only, and `write` brings the
+    result back.
 
     Attributes
     ----------
     model : PoseSegmentation
-        To be fitted if the work is learning, else fitted.
+        Unfitted if the job learns, else fitted.
     poses
-    wanted : Wanted
-    watch : Watch
+        Meshes to learn from, or to apply the model to.
+    request : LabelRequest
+        Settings of the labels.
+    guard : Watch
         Tells whether the scene is still as it was read.
     report : Report
     learns : bool
-        Whether the model is learned from the poses, and kept in the scene.
+        Whether the model is learned from the poses, and stored in the scene.
     number : int or "auto"
-        Segments that the settings asked for when the model was there.
+        Number of segments in the settings when the job was read.
     cache : Cache
-        Asked for signatures, and told of new ones.
+        Signatures computed earlier; new ones are added.
     described
-        What is known of each pose, once it was computed.
-    first : Work, optional
-        What this one is a change of.
+        The described poses, once computed.
+    first : SegmentationJob, optional
+        The job that this one repeats with other settings.
     labels
-        The part of each polygon of each character, once it was computed.
+        The part of each polygon of each character, once computed.
     """
 
     model: PoseSegmentation
     poses: list[Pose]
-    wanted: Wanted
-    watch: Watch
+    request: LabelRequest
+    guard: Watch
     report: Report
     learns: bool
     number: int | Literal["auto"]
     cache: Cache
     described: list[Workpiece] = field(default_factory=list)
-    first: Work | None = None
+    first: SegmentationJob | None = None
     labels: dict[Character, IntArray] = field(default_factory=dict)
-    _soft: dict[Character, dict[int, FloatArray]] | None = None
+    _weights: dict[Character, dict[int, FloatArray]] | None = None
 
     @classmethod
-    def learning(cls, context: bpy.types.Context) -> Work:
+    def learning(cls, context: bpy.types.Context, cache: Cache) -> SegmentationJob:
         """Read poses and settings to learn from; UserError if they cannot be used."""
         settings, report = context.scene.wks_segment, Report([])
         with report.stage("read"):
             report.poses = read_training_poses(context, settings)
         report.warnings += pose_warnings(report.poses, settings.source in ("FRAMES", "MARKERS"))
-        return cls._read(context, settings.new_model(), report.poses, report, learns=True)
+        return cls._read(context, settings.new_model(), report, cache, learns=True)
 
     @classmethod
     def applying(
-        cls, context: bpy.types.Context, model: PoseSegmentation | None = None,
+        cls, context: bpy.types.Context, cache: Cache, model: PoseSegmentation | None = None,
         objects: Sequence[bpy.types.Object] = (),
-    ) -> Work:  # fmt: skip
-        """Read objects to apply a model to them: the selected ones and the model in use if none are given.
+    ) -> SegmentationJob:  # fmt: skip
+        """Read objects to apply a model to: the selected ones and the model in use if none are given.
 
         Raises
         ------
@@ -97,85 +103,88 @@ class Work:
         with report.stage("read"):
             chosen = mesh_objects(objects) if objects else selected_meshes(context)
             report.poses = reader.read_objects(context, group(chosen))
-        return cls._read(context, model, report.poses, report, learns=False)
+        return cls._read(context, model, report, cache, learns=False)
 
     @classmethod
     def _read(
-        cls, context: bpy.types.Context, model: PoseSegmentation, poses: list[Pose], report: Report, learns: bool
-    ) -> Work:
+        cls, context: bpy.types.Context, model: PoseSegmentation, report: Report, cache: Cache, learns: bool
+    ) -> SegmentationJob:
+        settings, poses = context.scene.wks_segment, report.poses
         with report.stage("read"):
             characters = [pose.character for pose in poses]
-            wanted, watch = Wanted.of(context.scene.wks_segment, characters), Watch(context.scene, characters)
-        number, cache = context.scene.wks_segment.number(), session_of(context).cache
-        return cls(model, poses, wanted, watch, report, learns, number, cache)
+            request, guard = LabelRequest.of(settings, characters), Watch(context.scene, characters)
+        return cls(model, poses, request, guard, report, learns, settings.number(), cache)
 
-    def again(self, settings: WKSSegmentSettings) -> Work:
-        """The same poses and model with other settings, so that there are only labels to find.
+    def with_settings(self, settings: WKSSegmentSettings) -> SegmentationJob:
+        """The same poses and model with other settings, so that only labels need to be computed.
 
         Raises
         ------
         UserError
-            If this takes another model, or the scene has changed.
+            If the settings need another model, or the scene has changed.
         """
         first, number = self.first or self, settings.number()
-        first.watch.glance()
+        first.guard.glance()
         report = Report(first.poses, first.report.laplacians)
         model = copy(first.model)
         model.smoothness = settings.smoothness
         if number != first.number:
-            # Without sides nobody asks for regions, and those that were learned will do.
-            poses = first.described if first.learns and settings.sides == "two" else []
+            # Regions are learned anew only where sides need them; labels of one part for both sides do not.
+            described = first.described if first.learns and settings.sides == "two" else []
             try:
                 with report.stage("regroup"):
-                    model = model.with_segments(number, poses, first.poses[0].upright)
+                    model = model.with_segments(number, described, first.poses[0].upright)
             except ValueError as error:
-                raise UserError(f"This number of segments takes a new Learn and Segment: {error}") from error
+                raise UserError(
+                    "This number of segments takes a new Learn and Segment: {reason}", reason=message_of(error)
+                ) from error
         with report.stage("read"):
-            wanted = Wanted.of(settings, [pose.character for pose in first.poses])
-        return replace(first, model=model, wanted=wanted, report=report, first=first, labels={}, _soft=None)
+            request = LabelRequest.of(settings, [pose.character for pose in first.poses])
+        return replace(first, model=model, request=request, report=report, first=first, labels={}, _weights=None)
 
     def compute(self, progress: Progress) -> None:
-        """Describe, learn if that is the work, label; UserError if the core refuses. Fit for a thread."""
-        begun = LEARNED if self.learns else DESCRIBED
+        """Describe the poses, learn from them if asked to, and label them; UserError if the core refuses.
 
-        def describing(stage: str, share: float) -> None:
-            progress(stage, begun * share)
-
-        def labeling(stage: str, share: float) -> None:
-            progress(stage, begun + (1 - begun) * LABELED * share)
-
-        def softening(stage: str, share: float) -> None:
-            progress(stage, begun + (1 - begun) * (LABELED + (1 - LABELED) * share))
-
-        model, poses, wanted, report = self.model, self.poses, self.wanted, self.report
-        if not self.described and self.learns:
-            self.described = pipeline.learn(model, poses, report, describing, self.cache)
-        elif not self.described:
-            self.described = pipeline.describe(model, poses, report, describing, cache=self.cache)
-        self.labels = pipeline.label(model, poses, self.described, wanted, report, labeling)
-        self._soft = pipeline.soften(model, poses, self.described, self.labels, wanted, report, softening)
+        Touches nothing of Blender, so that a thread can run it.
+        """
+        label_start = LEARN_SHARE if self.learns else DESCRIBE_SHARE
+        weight_start = label_start + (1 - label_start) * LABEL_SHARE
+        if not self.described:
+            run = Run(self.report, progress.part(0.0, label_start), self.cache)
+            describe = pipeline.learn if self.learns else pipeline.describe
+            self.described = describe(self.model, self.poses, run)
+        run = Run(self.report, progress.part(label_start, weight_start))
+        self.labels = pipeline.label(self.model, self.poses, self.described, self.request, run)
+        run = Run(self.report, progress.part(weight_start, 1.0))
+        self._weights = pipeline.soften(self.model, self.poses, self.described, self.labels, self.request, run)
         if self.learns:
-            report.warnings += segment_warnings(model, report)
+            self.report.warnings += segment_warnings(self.model, self.report)
 
-    def write(self) -> None:
-        """Write labels, and a learned model; ChangedError, and nothing written, if what was read has changed."""
-        self.watch.look()
-        settings = self.watch.scene().wks_segment
-        # Another number of segments numbers them otherwise, as another model does.
+    def write(self, follows: bool = False) -> None:
+        """Write the labels, and the model if it was learned; ChangedError, and nothing written, if the scene changed.
+
+        Parameters
+        ----------
+        follows : bool
+            Whether the labels in the scene are from the same job, with other settings.
+        """
+        self.guard.look()
+        settings = self.guard.scene().wks_segment
+        # With another number of segments, or another model, a part can get another number.
         renumbered = self.learns or self.first is not None
-        # What follows settings is the same model; what is adjusted was undone, and its row with it.
-        follows = self.first is not None and session_of(bpy.context).holds(settings.id_data)
-        adds = self.learns and not (follows or settings.replace_model)
+        # A job that does not follow is either new, or adjusted after its undo, which has removed its row as well.
+        adds = self.learns and not (self.first is not None and follows) and not settings.replace_model
         if adds:
-            model_library.aside(
-                settings
-            )  # names and colors of now are the other model's, before they follow to this one
-        pipeline.write(settings, self.labels, self.wanted, self.report, self._soft, renumbered)
+            # Names and colors belong to the other model, and are stored before they are carried over to this one.
+            model_library.store_active(settings)
+        pipeline.write(settings, self.labels, self.request, self.report, self._weights, renumbered)
         if self.learns:
             names = list(dict.fromkeys(pose.character.name for pose in self.poses))
-            origin = f"From {', '.join(names[:3])}{' …' * (len(names) > 3)}"
-            model_library.keep(settings, self.model, [origin, *self.report.facts[:3]], ", ".join(names[:3]), adds)
+            first_names = ", ".join(names[:3])
+            origin = Message("From {names}", names=first_names + " …" * (len(names) > 3))
+            model_library.keep(settings, self.model, [origin, *self.report.facts[:3]], first_names, adds)
         elif self.first is not None:
-            # Or what is applied next would not have the segments that are seen.
-            origin = settings.model_summary.partition("\n")[0]
-            model_library.keep(settings, self.model, [origin, f"{self.model.n_segments_} segments"])
+            # The model is stored with this number of segments, so that applying it again gives the same ones.
+            origin = model_library.summary_of(settings)[0]
+            facts = [Message("{count} segments", count=self.model.n_segments_)]
+            model_library.keep(settings, self.model, [origin, *facts])

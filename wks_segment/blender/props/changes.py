@@ -1,0 +1,47 @@
+"""Tells the packages above that a property has changed.
+
+Blender wants the functions that set and update a property where the property is defined. What they do needs meshes,
+the live session and the list of models, which are defined above the properties. So `registration` connects a
+`PropertyListener`, and the properties call it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+
+class PropertyListener(Protocol):
+    """What follows from changes of properties; `settings` is always a `WKSSegmentSettings`."""
+
+    def labels_outdated(self, settings: Any) -> None:
+        """A setting that labels follow has changed."""
+
+    def model_chosen(self, settings: Any) -> None:
+        """Another row of the list of models has become active."""
+
+    def model_renamed(self, settings: Any, row: Any) -> None:
+        """A row of the list of models has another name."""
+
+    def rename_part(self, settings: Any, part: int, name: str) -> None:
+        """The user has typed another name for a part."""
+
+    def recolor_part(self, settings: Any, part: int, color: tuple[float, float, float]) -> None:
+        """The user has chosen another color for a part."""
+
+
+_connected: list[PropertyListener] = []
+
+
+def connect(new: PropertyListener) -> None:
+    """Let the properties call this listener only."""
+    _connected[:] = [new]
+
+
+def disconnect() -> None:
+    """Forget the listener."""
+    _connected.clear()
+
+
+def listener() -> PropertyListener:
+    """The connected listener; the extension connects one before it registers the properties."""
+    return _connected[0]

@@ -1,0 +1,34 @@
+"""What follows from changed properties: labels, the model in use, and names and colors on meshes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from . import model_library, segment_list
+from .live_session import session_of
+
+
+class PropertyChanges:
+    """The `PropertyListener` of the extension."""
+
+    def labels_outdated(self, settings: Any) -> None:
+        """Let labels follow the settings."""
+        session_of(bpy.context).schedule(settings.id_data)
+
+    def model_chosen(self, settings: Any) -> None:
+        """Use the model of the active row."""
+        model_library.use(settings, settings.active_model)
+
+    def model_renamed(self, settings: Any, row: Any) -> None:
+        """Keep the names of models unique."""
+        model_library.make_unique(settings, row)
+
+    def rename_part(self, settings: Any, part: int, name: str) -> None:
+        """Rename a part wherever its name is written."""
+        segment_list.rename(settings, part, name)
+
+    def recolor_part(self, settings: Any, part: int, color: tuple[float, float, float]) -> None:
+        """Recolor a part wherever its color is written."""
+        segment_list.recolor(settings, part, color)
