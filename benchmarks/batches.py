@@ -159,6 +159,7 @@ def cached(characters: list[Path], output: Path) -> None:
     from wks_segment.blender.scene.file_formats import open_files
     from wks_segment.blender.scene.poses import own_frames, read_frames
     from wks_segment.blender.workflow import pipeline
+    from wks_segment.blender.workflow.pipeline import Run
     from wks_segment.blender.workflow.report import Report
     from wks_segment.core import DiskCache, PoseSegmentation
 
@@ -177,7 +178,7 @@ def cached(characters: list[Path], output: Path) -> None:
         for number in (FIRST, SECOND):
             begun = time.monotonic()
             model = PoseSegmentation(n_segments=int(number))
-            pipeline.learn(model, poses, Report([]), lambda stage, share: None, cache)
+            pipeline.learn(model, poses, Run(Report([]), cache=cache))
             seconds.append(time.monotonic() - begun)
         shares.append(seconds[1] / seconds[0])
         print(table_row([path.stem, *(f"{each:.2f}" for each in seconds), f"{shares[-1]:.3f}"]), flush=True)

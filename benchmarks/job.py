@@ -21,7 +21,7 @@ import wks_segment.blender
 from benchmarks import shapes
 from wks_segment.blender.scene.pose_sources import read_training_poses
 from wks_segment.blender.workflow import pipeline
-from wks_segment.blender.workflow.pipeline import Wanted
+from wks_segment.blender.workflow.pipeline import LabelRequest, Run
 from wks_segment.blender.workflow.report import Report
 from wks_segment.core.poses import describe
 
@@ -71,16 +71,13 @@ def run() -> dict[str, dict[str, float]]:
         stages[name] = {"wall": time.perf_counter() - wall, "cpu": time.process_time() - cpu}
         return result
 
-    def quiet(stage: str, share: float) -> None:
-        pass
-
     model = settings.new_model()
     poses = timed("read", lambda: read_training_poses(bpy.context, settings))
-    described = timed("connect, eigenpairs, signature", lambda: pipeline.describe(model, poses, report, quiet))
+    described = timed("connect, eigenpairs, signature", lambda: pipeline.describe(model, poses, Run(report)))
     timed("mixture", lambda: model.fit(described))
-    wanted = timed("read meshes", lambda: Wanted.of(settings, (pose.character for pose in poses)))
-    labels = timed("label", lambda: pipeline.label(model, poses, described, wanted, report, quiet))
-    timed("write", lambda: pipeline.write(settings, labels, wanted, report))
+    request = timed("read meshes", lambda: LabelRequest.of(settings, (pose.character for pose in poses)))
+    labels = timed("label", lambda: pipeline.label(model, poses, described, request, Run(report)))
+    timed("write", lambda: pipeline.write(settings, labels, request, report))
     return stages
 
 

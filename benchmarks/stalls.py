@@ -21,7 +21,8 @@ import bpy
 import wks_segment.blender
 from benchmarks import shapes
 from wks_segment.blender.workflow.background_job import Job
-from wks_segment.blender.workflow.segmentation_job import Work
+from wks_segment.blender.workflow.segmentation_job import SegmentationJob
+from wks_segment.core import MemoryCache
 
 MOMENT = 0.02
 """Seconds between two looks."""
@@ -64,7 +65,7 @@ def main() -> None:
 def run() -> dict[str, Any]:
     """Learn, and measure."""
     begun = time.perf_counter()
-    work = Work.learning(bpy.context)
+    work = SegmentationJob.learning(bpy.context, MemoryCache())
     read = time.perf_counter() - begun
     gaps, job = watched(work)
     job.result()
@@ -74,7 +75,7 @@ def run() -> dict[str, Any]:
     return {"read": read, "write": written, "stages": work.report.seconds, "longest": gaps}
 
 
-def watched(work: Work) -> tuple[list[dict[str, Any]], Job]:
+def watched(work: SegmentationJob) -> tuple[list[dict[str, Any]], Job]:
     """The longest gaps between two looks while the work is computed, and the job."""
     gaps: list[dict[str, Any]] = []
     job = Job("Learn and Segment", work.compute, work.watch.glance)

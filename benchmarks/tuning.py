@@ -127,8 +127,8 @@ def run(n_poses: int) -> None:
     start = time.perf_counter()
     bpy.ops.wks_segment.learn()
     took = time.perf_counter() - start
-    assert session.work is not None
-    print(f"\nLearned in {took:.1f} seconds: {', '.join(session.work.report.facts[:2])}.\n")
+    assert session.job is not None
+    print(f"\nLearned in {took:.1f} seconds: {', '.join(session.job.report.facts[:2])}.\n")
     clock = Clock()
     clock.wrapped(PosedMesh, "mean", "posteriors")
     clock.wrapped(PosedMesh, "labeled", "clean-up")

@@ -37,7 +37,9 @@ class Progress:
         Where this work begins and ends within the whole.
     """
 
-    def __init__(self, report: ReportFunction | None = None, stage: str = "", start: float = 0.0, end: float = 1.0) -> None:
+    def __init__(
+        self, report: ReportFunction | None = None, stage: str = "", start: float = 0.0, end: float = 1.0
+    ) -> None:
         self.stage = stage
         self._titles: tuple[tuple[str, dict[str, object]], ...] = ()
         self._report = report

@@ -62,7 +62,7 @@ def test_preset_brings_settings_back(settings, user_folder):
     settings.model_summary = "of this file"
     assert bpy.ops.wks_segment.add_preset(name="Hero") == {"FINISHED"}
     (file,) = user_folder.rglob("*.py")
-    for name in presets.KEPT:
+    for name in presets.PRESET_SETTINGS:
         settings.property_unset(name)
     settings.model_summary = "of another file"
     bpy.ops.script.execute_preset(filepath=str(file), menu_idname="WKS_SEGMENT_MT_presets")
@@ -71,4 +71,4 @@ def test_preset_brings_settings_back(settings, user_folder):
 
 
 def test_presets_are_of_settings_that_there_are(settings):
-    assert set(presets.KEPT) <= set(settings.bl_rna.properties.keys())
+    assert set(presets.PRESET_SETTINGS) <= set(settings.bl_rna.properties.keys())

@@ -172,22 +172,22 @@ def test_each_place_has_its_own_setting(monkeypatch, function):
 
 
 def test_job_and_panel_speak_german(extension, monkeypatch):
-    from wks_segment.blender.ui.main_panel import wrapped
+    from wks_segment.blender.ui.main_panel import job_texts, wrapped_lines
     from wks_segment.blender.workflow.background_job import Job
 
     job = Job("Learn and Segment", lambda progress: None, lambda: None)
     job.wait(5)
     job.stage, job.share = 'Signature of "Fox, frame 12" (3 of 5)', 0.375
-    assert job.lines == ("Signature of Fox, frame 12 · 3 of 5", "38 %")
+    assert job_texts(job) == ("Signature of Fox, frame 12 · 3 of 5", "38 %")
     monkeypatch.setattr(messages, "bpy", Blender("de_DE"))
-    assert job.lines == ("Signatur von Fox, Frame 12 · 3 von 5", "38 %")
+    assert job_texts(job) == ("Signatur von Fox, Frame 12 · 3 von 5", "38 %")
     space = "\N{NO-BREAK SPACE}"
-    assert " ".join(wrapped(job.lines[0])) == f"Signatur von Fox, Frame{space}12 · 3{space}von{space}5".replace(
-        f"e{space}", "e "
-    )
+    assert " ".join(
+        wrapped_lines(job_texts(job)[0])
+    ) == f"Signatur von Fox, Frame{space}12 · 3{space}von{space}5".replace(f"e{space}", "e ")
     job.end()
-    assert job.lines == ("Wird abgebrochen", "")
+    assert job_texts(job) == ("Wird abgebrochen", "")
     said = []
     operator = SimpleNamespace(report=lambda kind, text: said.append((kind, text)))
-    _report.tell(operator, {"WARNING"}, job.epitaph)
+    _report.tell(operator, {"WARNING"}, job.end_message)
     assert said == [({"WARNING"}, "Lernen und segmentieren: abgebrochen, nichts ist geschrieben")]

@@ -6,7 +6,7 @@ import pytest
 from builders import changes, labels_of, limbed_rigged, scene_snapshot, select, snapshot
 
 from wks_segment.blender.parts.palette import colors_of
-from wks_segment.blender.ui.preview import DARKEST, OFFSET, picture
+from wks_segment.blender.ui.preview import DARKEST_SHADE, SURFACE_OFFSET, preview_triangles
 from wks_segment.blender.workflow.live_session import session_of
 
 pytestmark = pytest.mark.usefixtures("scene")
@@ -36,7 +36,7 @@ def rest(session):
     session._due = 0.0
     if bpy.app.timers.is_registered(session.timer):
         bpy.app.timers.unregister(session.timer)
-    assert session.tick() is None
+    assert session.on_timer() is None
 
 
 def test_what_is_shown_is_not_written(walker, settings, session):
@@ -44,7 +44,7 @@ def test_what_is_shown_is_not_written(walker, settings, session):
     settings.n_segments = 2
     rest(session)
     assert session.preview.shown
-    assert len(session.preview.places) == len(session.preview.colors) == 3 * len(walker.data.polygons)
+    assert len(session.preview.corners) == len(session.preview.colors) == 3 * len(walker.data.polygons)
     assert not changes(before, snapshot(walker.data))
     assert settings.model == model
 
@@ -57,8 +57,8 @@ def test_accept_writes_what_was_shown(walker, settings, session):
     np.testing.assert_array_equal(labels_of(walker), shown)
     assert set(shown) == {0, 1}
     assert not session.preview.shown
-    assert len(session.preview.places) == 0
-    assert session.follows(bpy.context.scene)
+    assert len(session.preview.corners) == 0
+    assert session.is_current(bpy.context.scene)
     assert not OPS.accept.poll()
 
 
@@ -117,24 +117,24 @@ def test_the_picture_is_of_what_is_seen(walker, settings, session):
     """At another frame, through a modifier, a little above the surface, in the colors of the parts, shaded."""
     walker.modifiers.new("Fine", "SUBSURF").levels = 1
     bpy.context.scene.frame_set(11)
-    work = session.work
-    (character,) = {pose.character for pose in work.poses}
+    job = session.job
+    (character,) = {pose.character for pose in job.poses}
     labels = np.arange(len(walker.data.polygons)) % 3
-    places, colors = picture(bpy.context, {character: labels})
+    places, colors = preview_triangles(bpy.context, {character: labels})
     evaluated = walker.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
     seen = np.array([vertex.co for vertex in evaluated.vertices])
     assert len(places) == 3 * 2 * 3 * len(walker.data.polygons)  # three quads for each triangle
     size = np.ptp(seen, axis=0).max()
     nearest = np.linalg.norm(places[::50, None] - seen, axis=2).min(axis=1)
-    np.testing.assert_allclose(nearest, OFFSET * size, rtol=1e-3)
+    np.testing.assert_allclose(nearest, SURFACE_OFFSET * size, rtol=1e-3)
     assert (colors[:, 3] == 1).all()
     plain = colors_of(np.repeat(labels, 6))
     shade = colors[::3, :3].max(axis=1) / plain.max(axis=1)
     np.testing.assert_allclose(colors[::3, :3], plain * shade[:, None], atol=1e-6)
-    assert DARKEST - 1e-6 <= shade.min() < shade.max() <= 1 + 1e-6
+    assert DARKEST_SHADE - 1e-6 <= shade.min() < shade.max() <= 1 + 1e-6
 
 
 def test_nothing_is_shown_of_what_is_not_there():
-    places, colors = picture(bpy.context, {})
+    places, colors = preview_triangles(bpy.context, {})
     assert places.shape == (0, 3)
     assert colors.shape == (0, 4)

@@ -15,19 +15,22 @@ import numpy as np
 import pytest
 from builders import changes, labels_of, limbed, limbed_poses, mesh_object, scene_snapshot, select, snapshot
 
-from wks_segment.blender import operators
 from wks_segment.blender.errors import ChangedError, TooLargeError, UserError
 from wks_segment.blender.operators import _report
-from wks_segment.blender.operators._base import RunsWork
+from wks_segment.blender.operators._base import LabelOperator
+from wks_segment.blender.operators.apply import WKS_SEGMENT_OT_apply
+from wks_segment.blender.operators.learn import WKS_SEGMENT_OT_learn
 from wks_segment.blender.ui import main_panel
 from wks_segment.blender.workflow import background_job, live_session
-from wks_segment.blender.workflow.background_job import BUSY, Job, TimeLeft, desk_of
-from wks_segment.blender.workflow.segmentation_job import Work
+from wks_segment.blender.workflow.background_job import JOB_RUNNING, Job, TimeLeft, job_holder
+from wks_segment.blender.workflow.segmentation_job import SegmentationJob
+from wks_segment.core import MemoryCache
+from wks_segment.core.progress import Progress
 
 pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
 BENDS = (0.0, 0.3, 0.6)
-LEARN, APPLY = operators.WKS_SEGMENT_OT_learn, operators.WKS_SEGMENT_OT_apply
+LEARN, APPLY = WKS_SEGMENT_OT_learn, WKS_SEGMENT_OT_apply
 GOING = {"PASS_THROUGH"}
 STAGES = ["Starting", "Seams", "Signature", "Learning", "Labels", "Left and right", "Weights"]
 LONG = 60
@@ -42,7 +45,7 @@ class Ran:
         own = {name: getattr(operator, name) for name in ("bl_label", "verb", "learns", "read")}
         report = {"report": lambda self, kinds, text: said.append((*kinds, text)), "said": said, "confirmed": False}
         plain = {"take": lambda self, settings: None, "is_adjusted": False}
-        return type("Ran", (RunsWork,), own | report | plain | properties)()
+        return type("Ran", (LabelOperator,), own | report | plain | properties)()
 
 
 @pytest.fixture
@@ -60,7 +63,7 @@ def at(monkeypatch):
     goes_on = threading.Event()
 
     def hold(stage, operator=LEARN, **properties):
-        reached, original = threading.Event(), Job._progress
+        reached, original = threading.Event(), Job._report
 
         def progress(self, now, share):
             if now.startswith(stage) and not reached.is_set():
@@ -68,7 +71,7 @@ def at(monkeypatch):
                 assert goes_on.wait(LONG)
             original(self, now, share)
 
-        monkeypatch.setattr(Job, "_progress", progress)
+        monkeypatch.setattr(Job, "_report", progress)
         ran = Ran(operator, **properties)
         ran.begin(bpy.context)
         assert reached.wait(LONG)
@@ -86,7 +89,7 @@ def ended(ran):
         assert time.monotonic() - begun < LONG
         time.sleep(0.01)
         result = ran.step(bpy.context)
-    assert desk_of(bpy.context).job is None
+    assert job_holder(bpy.context).job is None
     return result
 
 
@@ -143,12 +146,12 @@ def test_undo_after_a_job_gives_back_what_was(poses):
 
 
 def test_nothing_of_blender_is_needed_between_reading_and_writing(poses):
-    work = Work.learning(bpy.context)
+    job = SegmentationJob.learning(bpy.context, MemoryCache())
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     before = scene_snapshot()
-    work.compute(lambda stage, share: None)
+    job.compute(Progress())
     with pytest.raises(ChangedError, match='the scene "Scene" was deleted'):
-        work.write()
+        job.write()
     assert not changes(before, scene_snapshot())
 
 
@@ -190,7 +193,7 @@ def test_writing_waits_until_blender_can_undo_it(poses, at):
     ran.job.wait(LONG)
     for _ in range(3):
         assert ran.step(bpy.context) == GOING
-    assert ran.job.lines[0] == "Done, to be written in Object Mode"
+    assert ran.job.stage == "Done, to be written in Object Mode"
     assert "wks_segment" not in poses[0].data.attributes
     bpy.ops.object.mode_set(mode="OBJECT")
     assert ended(ran) == {"FINISHED"}
@@ -207,7 +210,7 @@ def test_escape_ends_it_at_every_stage_and_nothing_is_written(poses, at, stage):
     ran, go_on = at(stage)
     assert ran.modal(bpy.context, SimpleNamespace(type="MOUSEMOVE", value="NOTHING")) == GOING
     assert ran.modal(bpy.context, SimpleNamespace(type="ESC", value="PRESS")) == {"RUNNING_MODAL"}
-    assert ran.job.lines == ("Canceling", "")
+    assert main_panel.job_texts(ran.job) == ("Canceling", "")
     go_on()
     assert ended(ran) == {"CANCELLED"}
     assert ran.said == [("WARNING", "Learn and Segment was canceled, nothing is written")]
@@ -237,9 +240,9 @@ def test_second_job_is_refused_and_the_first_goes_on(poses, at):
     for operator in (OPS.learn, OPS.apply):
         bpy.context.scene.wks_segment.model = "something"
         assert not operator.poll()
-        with pytest.raises(RuntimeError, match=BUSY):
+        with pytest.raises(RuntimeError, match=JOB_RUNNING):
             operator()
-    with pytest.raises(UserError, match=BUSY):
+    with pytest.raises(UserError, match=JOB_RUNNING):
         Ran(LEARN).begin(bpy.context)
     go_on()
     assert ended(ran) == {"FINISHED"}
@@ -333,7 +336,7 @@ def test_what_takes_away_its_meshes_ends_it(poses, at, happens, reason, stage):
     assert ended(ran) == {"CANCELLED"}
     message = f"Learn and Segment was ended, nothing is written: {reason}"
     assert ran.said == [("WARNING", message)]
-    assert desk_of(bpy.context).said == message
+    assert job_holder(bpy.context).message == message
     assert not changes(after, scene_snapshot())
     if bpy.context.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
@@ -344,8 +347,8 @@ def test_blender_that_takes_the_window_away_ends_it(poses, at):
     before = scene_snapshot()
     ran, go_on = at("Learning")
     ran.cancel(bpy.context)
-    assert desk_of(bpy.context).job is None
-    assert "its window was closed" in desk_of(bpy.context).said
+    assert job_holder(bpy.context).job is None
+    assert "its window was closed" in job_holder(bpy.context).message
     go_on()
     ran.job.wait(LONG)
     assert not ran.job.succeeded
@@ -355,7 +358,7 @@ def test_blender_that_takes_the_window_away_ends_it(poses, at):
 
 @pytest.mark.usefixtures("learns_anew")
 def test_extension_that_is_disabled_ends_it(poses, at, extension, monkeypatch):
-    monkeypatch.setattr(background_job, "PATIENCE", 0.1)
+    monkeypatch.setattr(background_job, "EXIT_WAIT", 0.1)
     meshes = {pose.name: snapshot(pose.data) for pose in poses}
     ran, go_on = at("Learning")
     extension.unregister()
@@ -378,9 +381,9 @@ def test_blender_that_is_quit_does_not_wait():
         import sys, threading
         import bpy
         import wks_segment.blender as extension
-        from wks_segment.blender.workflow.background_job import desk_of
+        from wks_segment.blender.workflow.background_job import job_holder
         extension.register()
-        job = desk_of(bpy.context).start("Learn", lambda progress: threading.Event().wait(), lambda: None)
+        job = job_holder(bpy.context).start("Learn", lambda progress: threading.Event().wait(), lambda: None)
         extension.unregister()
         print("on the way out", flush=True)
     """
@@ -414,12 +417,12 @@ def test_error_in_the_thread_is_the_same_as_without_one(settings):
 
 
 def test_defect_of_ours_is_no_silence(poses, monkeypatch):
-    monkeypatch.setattr(Work, "compute", lambda self, progress: 1 / 0)
+    monkeypatch.setattr(SegmentationJob, "compute", lambda self, progress: 1 / 0)
     ran = Ran(LEARN)
     ran.begin(bpy.context)
     with pytest.raises(ZeroDivisionError):
         ended(ran)
-    assert desk_of(bpy.context).job is None
+    assert job_holder(bpy.context).job is None
     assert ran.modal(bpy.context, SimpleNamespace(type="TIMER", value="NOTHING")) == {"CANCELLED"}
 
 
@@ -444,7 +447,7 @@ class Window:
         self.window = object()
         held = {
             holder: getattr(bpy.context.window_manager, holder)
-            for holder in (background_job.HOLDER, live_session.HOLDER)
+            for holder in (background_job.JOB_HOLDER, live_session.SESSION)
         }
         self.window_manager = MagicMock(**held, windows=[])
         self.window_manager.event_timer_add.return_value = None
@@ -463,7 +466,7 @@ def window(monkeypatch):
 def test_button_starts_a_job_and_the_window_tells_the_time(poses, window):
     ran = Ran(LEARN)
     assert ran.invoke(window, None) == {"RUNNING_MODAL"}
-    window.window_manager.event_timer_add.assert_called_once_with(background_job.TICK, window=window.window)
+    window.window_manager.event_timer_add.assert_called_once_with(background_job.TIMER_INTERVAL, window=window.window)
     window.window_manager.modal_handler_add.assert_called_once_with(ran)
     result, begun = GOING, time.monotonic()
     while result == GOING and time.monotonic() - begun < LONG:
@@ -477,7 +480,7 @@ def test_without_a_window_the_button_does_all_at_once(poses):
     assert bpy.app.background
     assert OPS.learn("INVOKE_DEFAULT") == {"FINISHED"}
     assert "wks_segment" in poses[0].data.attributes
-    assert desk_of(bpy.context).job is None
+    assert job_holder(bpy.context).job is None
 
 
 def test_large_job_is_asked_about_and_then_runs(poses, settings, window):
@@ -486,7 +489,7 @@ def test_large_job_is_asked_about_and_then_runs(poses, settings, window):
         Ran(LEARN).begin(window)
     ran = Ran(LEARN)
     assert ran.invoke(window, "event") == {"RUNNING_MODAL"}
-    assert desk_of(bpy.context).job is None
+    assert job_holder(bpy.context).job is None
     ((asked, event), options) = window.window_manager.invoke_confirm.call_args
     assert (asked, event) == (ran, "event")
     assert "allowed are 5.0 minutes and 0.0 GB" in options["message"]
@@ -522,7 +525,7 @@ def drawn():
 def test_panel_shows_how_far_it_is_and_why_it_ended(poses, at):
     assert not drawn().row.return_value.progress.called
     ran, go_on = at("Signature")
-    job = desk_of(bpy.context).job
+    job = job_holder(bpy.context).job
     job.stage, job.share = 'Signature of "Fox, frame 12" (3 of 5)', 0.375
     column = drawn()
     lines = [call.kwargs["text"] for call in column.label.call_args_list]
@@ -554,5 +557,5 @@ def test_panel_shows_how_far_it_is_and_why_it_ended(poses, at):
 def test_time_left(told, text):
     left = TimeLeft()
     for seconds, share in told:
-        left.tell(seconds, share)
-    assert str(left) == text
+        left.update(seconds, share)
+    assert left.text == text

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from builders import changes, coordinates, labels_of, limbed_poses, limbed_rigged, select, snapshot
 
-from wks_segment.blender.operators._base import RunsWork
+from wks_segment.blender.operators._base import LabelOperator
 from wks_segment.blender.workflow import live_session as module
 from wks_segment.blender.workflow.live_session import session_of
 from wks_segment.core import PoseSegmentation
@@ -56,7 +56,7 @@ def rest(session):
     session._due = 0.0
     if bpy.app.timers.is_registered(session.timer):
         bpy.app.timers.unregister(session.timer)
-    return session.tick()
+    return session.on_timer()
 
 
 # Signatures are not computed twice
@@ -90,10 +90,10 @@ def test_labels_follow_a_setting_and_are_those_of_apply(walker, settings, sessio
     assert fits == {"fit": 0, "describe": 0}
     # The model that is stored now says the same by itself, on the same poses.
     stored = PoseSegmentation.from_json(settings.model)
-    work = session.work
+    job = session.job
     again = stored.segment_polygons(
-        [piece.pose for piece in work.described],
-        [pose.polygon_of for pose in work.poses],
+        [piece.pose for piece in job.described],
+        [pose.polygon_of for pose in job.poses],
         settings.min_share / 100,
     )
     np.testing.assert_array_equal(follows, again)
@@ -144,7 +144,7 @@ def test_a_changed_seed_needs_nothing(walker, settings, session):
     settings.random_state = 5
     rest(session)
     assert not changes(before, snapshot(walker.data))
-    assert session.follows(bpy.context.scene)
+    assert session.is_current(bpy.context.scene)
 
 
 def test_what_was_applied_follows_and_the_model_with_it(walker, settings, session, fits):
@@ -202,11 +202,11 @@ def test_a_change_can_be_undone_by_itself_and_redone(walker, settings, session):
     assert bpy.ops.ed.undo() == {"FINISHED"}
     np.testing.assert_array_equal(labels_of(bpy.data.objects[name]), four)
     assert bpy.context.scene.wks_segment.n_segments == 4, "the setting stays when its labels go"
-    assert session.follows(bpy.context.scene)
+    assert session.is_current(bpy.context.scene)
     assert bpy.ops.ed.redo() == {"FINISHED"}
     np.testing.assert_array_equal(labels_of(bpy.data.objects[name]), two)
     assert bpy.context.scene.wks_segment.n_segments == 2
-    assert session.follows(bpy.context.scene)
+    assert session.is_current(bpy.context.scene)
     bpy.context.scene.wks_segment.n_segments = 3
     rest(session)
     assert labels_of(bpy.data.objects[name]).max() == 2
@@ -225,13 +225,13 @@ def test_undo_leaves_a_setting_that_labels_do_not_follow(walker, settings, sessi
 def test_undo_of_something_else_leaves_a_number_that_was_refused(walker, settings, session):
     settings.n_segments = 60
     rest(session)
-    assert "takes a new Learn and Segment" in session.said
+    assert "takes a new Learn and Segment" in session.message
     bpy.ops.ed.undo_push(message="the number")
     walker.location.x = 1
     bpy.ops.ed.undo_push(message="moved")
     assert bpy.ops.ed.undo() == {"FINISHED"}
     assert bpy.context.scene.wks_segment.n_segments == 60
-    assert "takes a new Learn and Segment" in session.said
+    assert "takes a new Learn and Segment" in session.message
 
 
 def test_what_was_undone_does_not_come_back_when_a_preview_is_discarded(walker, settings, session):
@@ -256,8 +256,8 @@ def test_between_two_steps_of_redo_an_update_is_offered(walker, settings, sessio
     rest(session)
     bpy.ops.ed.undo()
     bpy.ops.ed.redo()
-    assert not session.follows(bpy.context.scene)
-    assert not session.waits
+    assert not session.is_current(bpy.context.scene)
+    assert not session.is_scheduled
     assert OPS.update.poll()
 
 
@@ -288,7 +288,7 @@ def test_adjusting_learn_does_not_learn_again(session, settings, fits, monkeypat
     assert (last.n_segments, last.auto_segments, last.sides) == (4, False, "one")
     bpy.ops.ed.undo()
     assert bpy.context.scene.wks_segment.applied == ""
-    monkeypatch.setattr(RunsWork, "is_adjusted", True)
+    monkeypatch.setattr(LabelOperator, "is_adjusted", True)
     assert OPS.learn("EXEC_DEFAULT", True, n_segments=2) == {"FINISHED"}
     assert set(labels_of(bpy.data.objects["Walker"])) == {0, 1}
     assert bpy.context.scene.wks_segment.n_segments == 2
@@ -317,7 +317,7 @@ def test_nothing_follows_when_it_is_off_and_update_does_it(walker, settings, ses
 
 
 def test_nothing_follows_by_itself_where_it_takes_long(walker, settings, session, monkeypatch):
-    session.work.report.seconds["label"] = 6.0
+    session.job.report.seconds["label"] = 6.0
     settings.n_segments = 2
     assert not bpy.app.timers.is_registered(session.timer)
     assert OPS.update() == {"FINISHED"}
@@ -327,7 +327,7 @@ def test_nothing_follows_by_itself_where_it_takes_long(walker, settings, session
 def test_settings_that_come_to_rest_are_waited_for(walker, settings, session):
     settings.n_segments = 2
     assert bpy.app.timers.is_registered(session.timer)
-    assert 0 < session.tick() <= module.REST
+    assert 0 < session.on_timer() <= module.QUIET_SECONDS
     assert labels_of(walker).max() == 3
     bpy.app.timers.unregister(session.timer)
 
@@ -338,16 +338,16 @@ def test_an_edited_mesh_is_left_alone(walker, settings, session):
     settings.n_segments = 2
     rest(session)
     assert not changes(before, snapshot(walker.data))
-    assert 'the mesh of "Walker" was edited' in session.said
-    assert session.work is None
+    assert 'the mesh of "Walker" was edited' in session.message
+    assert session.job is None
 
 
 def test_a_removed_object_is_forgotten(walker, settings, session):
     bpy.data.objects.remove(walker)
     settings.n_segments = 2
     rest(session)
-    assert '"Walker" was deleted' in session.said
-    assert session.work is None
+    assert '"Walker" was deleted' in session.message
+    assert session.job is None
 
 
 def test_in_edit_mode_nothing_follows_until_it_is_left(walker, settings, session):
@@ -377,7 +377,7 @@ def test_another_file_forgets_the_work(walker, session, tmp_path):
     path = str(tmp_path / "kept.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
-    assert session.work is None
+    assert session.job is None
     bpy.context.scene.wks_segment.n_segments = 2
     rest(session)
     assert labels_of(bpy.data.objects["Walker"]).max() == 3
@@ -393,15 +393,15 @@ def test_the_papers_setting_cannot_be_cut_otherwise_but_smoothed_settings_hold(s
     settings.n_segments = 3
     rest(session)
     np.testing.assert_array_equal(labels_of(obj), before)
-    assert "takes a new Learn and Segment" in session.said
+    assert "takes a new Learn and Segment" in session.message
 
 
 def test_what_is_too_large_is_not_kept(session, settings, monkeypatch):
-    monkeypatch.setattr(module, "MOST_BYTES", 1000)
+    monkeypatch.setattr(module, "MAX_KEPT_BYTES", 1000)
     obj = limbed_rigged()
     select(obj)
     settings.source, settings.pose_count = "FRAMES", 2
     assert OPS.learn() == {"FINISHED"}
-    assert session.work is None
+    assert session.job is None
     assert coordinates(obj.data).shape[1] == 3
     assert not OPS.update.poll()

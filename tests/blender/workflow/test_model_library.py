@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from builders import error_of, labels_of, limbed_poses, select
 
-from wks_segment.blender.props.preferences import PACKAGE, WKSSegmentPreferences, model_folder, preference
+from wks_segment.blender.props.preferences import EXTENSION, WKSSegmentPreferences, model_folder, preference
 from wks_segment.blender.ui import models_panel
 from wks_segment.blender.workflow import model_library
 from wks_segment.blender.workflow.live_session import session_of
@@ -235,14 +235,14 @@ def test_models_of_a_folder(two, tmp_path):
 
 
 def test_preferences_are_of_the_extension():
-    assert WKSSegmentPreferences.bl_idname == PACKAGE == "wks_segment"
+    assert WKSSegmentPreferences.bl_idname == EXTENSION == "wks_segment"
 
 
 @pytest.fixture
 def kept():
     """Preferences, as an installed extension has them."""
     addon = bpy.context.preferences.addons.new()
-    addon.module = PACKAGE
+    addon.module = EXTENSION
     yield addon.preferences
     bpy.context.preferences.addons.remove(addon)
 
@@ -253,7 +253,7 @@ def test_preferences_hold_where_there_are_some(kept, tmp_path):
     assert model_folder(bpy.context) == str(tmp_path)
     session = session_of(bpy.context)
     assert session.cache.limit == 7_000_000
-    bpy.context.preferences.addons[PACKAGE].preferences.cache_megabytes = 9
+    bpy.context.preferences.addons[EXTENSION].preferences.cache_megabytes = 9
     assert session.cache.limit == 9_000_000
 
 

@@ -53,7 +53,8 @@ def write(settings, *objects):
 
 def write_labels(settings, labels, report=None, renumbered=False):
     """Write parts of polygons, as a model would give them."""
-    pipeline.write(settings, labels, pipeline.Wanted.of(settings, labels), report or Report([]), renumbered=renumbered)
+    request = pipeline.LabelRequest.of(settings, labels)
+    pipeline.write(settings, labels, request, report or Report([]), renumbered=renumbered)
 
 
 @pytest.fixture

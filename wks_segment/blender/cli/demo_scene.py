@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
-from ...core.poses.describe import Progress
+from ...core.progress import Progress
 from ..errors import UserError
 from ..props.settings import WKSSegmentSettings
 from ..render.contact_sheet import Tile, render_poses
@@ -17,7 +17,7 @@ from ..scene import file_formats
 from ..scene import poses as reader
 from ..scene.characters import Character
 from ..workflow import model_library, pipeline
-from ..workflow.pipeline import Wanted
+from ..workflow.pipeline import LabelRequest, Run
 from ..workflow.report import Report, pose_warnings
 from .creature import FIRST_FRAME, LAST_FRAME, build_creature
 
@@ -69,32 +69,26 @@ def run(
     report.poses = poses
     training = [pose for pose, known in zip(poses, learned, strict=True) if known]
     others = [pose for pose, known in zip(poses, learned, strict=True) if not known]
-    model, wanted = settings.new_model(), Wanted.of(settings, [character])
+    model, request = settings.new_model(), LabelRequest.of(settings, [character])
     pipeline.check_limits(model, poses, settings)
-    described = pipeline.learn(model, training, report, lambda stage, done: progress(stage, 0.5 * done))
-    together = pipeline.label(model, training, described, wanted, report, lambda stage, done: progress(stage, 0.5))
-    soft = pipeline.soften(
-        model, training, described, together, wanted, report, lambda stage, done: progress(stage, 0.5)
-    )
-    model_library.aside(settings)
-    pipeline.write(settings, together, wanted, report, soft, renumbered=True)
+    described = pipeline.learn(model, training, Run(report, progress.part(0.0, 0.5)))
+    at_half = Run(report, progress.part(0.5, 0.5))
+    together = pipeline.label(model, training, described, request, at_half)
+    soft = pipeline.soften(model, training, described, together, request, at_half)
+    model_library.store_active(settings)
+    pipeline.write(settings, together, request, report, soft, renumbered=True)
     counted = report.n_segments, report.parts
-
-    def later(stage: str, done: float) -> None:
-        progress(stage, 0.5 + 0.4 * done)
-
-    described += pipeline.describe(model, others, report, later)
+    described += pipeline.describe(model, others, Run(report, progress.part(0.5, 0.9)))
+    after = Run(report, progress.part(0.9, 0.9))
     labels_of = {
-        pose.name: pipeline.label(model, [pose], [signature], wanted, report, lambda stage, done: later(stage, 1.0))[
-            character
-        ]
+        pose.name: pipeline.label(model, [pose], [signature], request, after)[character]
         for pose, signature in zip(training + others, described, strict=True)
     }
     report.n_segments, report.parts = counted
     own = [labels_of[pose.name] for pose in poses]
     agreement = agreements(own, learned, [polygon_areas(pose, len(own[0])) for pose in poses])
 
-    progress("Picture", 0.95)
+    progress(0.95, "Picture")
     with report.stage("render"):
         captions = [f"{frame} {'learned' if known else 'unseen'}" for frame, known in zip(frames, learned, strict=True)]
         render_poses([Tile(*of_pose) for of_pose in zip(poses, own, captions, strict=True)], paths["picture"])

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TextIO
 
-from ...core.poses.describe import Progress
+from ...core.progress import Progress
 
 
 @contextmanager
@@ -20,20 +20,20 @@ def terminal_progress() -> Iterator[Progress]:
         from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
         from rich.progress import Progress as Bar
     except ImportError:  # inside Blender: the extension carries no wheel just for this
-        yield _lines
+        yield Progress(_lines)
         return
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield _lines
+        yield Progress(_lines)
         return
     columns = (TextColumn("{task.description:<44}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     with Bar(*columns, console=console) as bar:
         task = bar.add_task("", total=1.0)
 
-        def progress(stage: str, fraction: float) -> None:
-            bar.update(task, description=stage, completed=fraction)
+        def show(stage: str, share: float) -> None:
+            bar.update(task, description=stage, completed=share)
 
-        yield progress
+        yield Progress(show)
         bar.update(task, description="Done", completed=1.0)
 
 

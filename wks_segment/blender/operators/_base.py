@@ -42,7 +42,7 @@ class BaseOperator:
         for need in cls.needs:
             missing = need(context)
             if missing is not None:
-                _report.explain(cls, missing)  # type: ignore[arg-type]  # mixed in to an operator
+                _report.explain(cls, missing)
                 return False
         return True
 

@@ -22,7 +22,9 @@ class WKS_SEGMENT_OT_unwrap(BaseOperator, bpy.types.Operator):
 
     needs = (_needs.no_job, _needs.object_mode, _needs.labeled_mesh)
 
-    method: EnumProperty(name="Method", description="Where islands are cut in addition to the borders of segments", items=METHODS)
+    method: EnumProperty(
+        name="Method", description="Where islands are cut in addition to the borders of segments", items=METHODS
+    )
 
     def run(self, context: bpy.types.Context) -> set[str]:
         objects = [obj for character in group(selected_meshes(context)) for obj in character.objects]

@@ -330,9 +330,7 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
     faces_by_hand: IntProperty(
         options={"HIDDEN"}, description="Number of faces whose segment was assigned by hand", min=0, max=999_999
     )
-    part_notes: StringProperty(
-        options={"HIDDEN"}, description="Names, colors and merges of parts by the user, as JSON"
-    )
+    part_notes: StringProperty(options={"HIDDEN"}, description="Names, colors and merges of parts by the user, as JSON")
 
     def number(self) -> int | Literal["auto"]:
         """The number of segments in the form that a model takes."""

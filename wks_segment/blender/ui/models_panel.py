@@ -23,7 +23,9 @@ SHOWN_RANKS = 6
 class WKS_SEGMENT_UL_models(bpy.types.UIList):
     """Row of the list: name and number of segments. The sidebar is too narrow for more."""
 
-    def draw_item(self, context: bpy.types.Context, layout: Any, data: Any, item: Any, *_: Any) -> None:
+    def draw_item(
+        self, context: bpy.types.Context, layout: Any, data: Any, item: Any, icon: int, active_data: Any, *_: Any
+    ) -> None:
         row = layout.row(align=True)
         row.prop(item, "name", text="", emboss=False)
         segments = row.row(align=True)

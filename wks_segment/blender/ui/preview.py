@@ -23,7 +23,7 @@ SURFACE_OFFSET = 2e-3
 """Height of the preview above the surface as a share of the character's size. With less the surface shows through from
 afar; with more the outline grows visibly."""
 DARKEST_SHADE = 0.55
-"""Brightness of faces edge-on to the light. With less, dark colors are hard to tell apart; with more, forms get lost."""
+"""Brightness of faces edge-on to the light. With less, dark colors look alike there; with more, the form gets lost."""
 LIGHT_DIRECTION = np.array([0.3, -0.5, 0.8])
 """Direction to the light: from above, in front of a character that looks along -y, as in Blender's front view."""
 

@@ -28,7 +28,9 @@ NO_SEGMENTS = "No segments yet: learn a model, or apply one"
 class WKS_SEGMENT_UL_segments(bpy.types.UIList):
     """Row of the list: color, name, share of the area, visibility."""
 
-    def draw_item(self, context: bpy.types.Context, layout: Any, data: Any, item: Any, *_: Any) -> None:
+    def draw_item(
+        self, context: bpy.types.Context, layout: Any, data: Any, item: Any, icon: int, active_data: Any, *_: Any
+    ) -> None:
         row = layout.row(align=True)
         color = row.row(align=True)
         color.ui_units_x = 1.2

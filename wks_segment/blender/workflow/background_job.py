@@ -141,9 +141,7 @@ class Job:
     def end_message(self) -> str:
         """What to tell the user about a job that was asked to end."""
         if self._reason:
-            return Message(
-                "{job} was ended, nothing is written: {reason}", job=Message(self.name), reason=self._reason
-            )
+            return Message("{job} was ended, nothing is written: {reason}", job=Message(self.name), reason=self._reason)
         return Message("{job} was canceled, nothing is written", job=Message(self.name))
 
     def _report(self, stage: str, share: float) -> None:

@@ -13,7 +13,7 @@ from bpy.app.handlers import persistent
 
 from ...core import MemoryCache
 from ...core.mesh.triangle_mesh import IntArray
-from ...core.message import Message, message_of
+from ...core.message import message_of
 from ...core.progress import Progress
 from ..errors import ChangedError, UserError
 from ..outputs.overrides import merged
@@ -33,8 +33,8 @@ FOLLOWED_SETTINGS = ("n_segments", "auto_segments", "sides", "smoothness", "min_
 """Settings that labels follow."""
 NOTHING_TO_UPDATE = "Nothing was learned or applied since this file was opened, or it was undone"
 MAX_KEPT_BYTES = 1_000_000_000
-"""Most bytes of signatures in a kept job. With less, labels of larger characters would not follow; with more, the memory
-of the machine fills without being asked for."""
+"""Most bytes of signatures in a kept job. With less, labels of large characters would not follow; with more, memory
+fills without being asked for."""
 
 
 class Preview(Protocol):

@@ -13,7 +13,6 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-
 from ...core import ModelFileError, PoseSegmentation
 from ...core.message import message_of
 from ..errors import UserError

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core import PoseSegmentation, PoseSignature, Ranking, SignatureCache, described_alike, rank
+from ...core import Cache, PoseSegmentation, PoseSignature, Ranking, described_alike, rank
 from ...core.message import Message, message_of
 from ...core.progress import Progress
 from ..errors import UserError
@@ -111,11 +111,11 @@ class RankingJob:
     poses: list[Pose]
     guard: Watch
     report: Report
-    cache: SignatureCache
+    cache: Cache
     ranking: Ranking | None = None
 
     @classmethod
-    def read(cls, context: bpy.types.Context, cache: SignatureCache) -> RankingJob:
+    def read(cls, context: bpy.types.Context, cache: Cache) -> RankingJob:
         """Read the models, and the active character in its current pose; UserError if either cannot be used."""
         report = Report([])
         model_library.list_active(context.scene.wks_segment)

@@ -16,9 +16,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...core import (
+    Cache,
     Connection,
     PoseSegmentation,
-    SignatureCache,
     SpectrumError,
     SpectrumWarning,
     Workpiece,
@@ -66,7 +66,7 @@ class Run:
 
     report: Report
     progress: Progress = field(default_factory=Progress)
-    cache: SignatureCache | None = None
+    cache: Cache | None = None
     workers: int | None = None
 
     def with_progress(self, progress: Progress) -> Run:
@@ -275,11 +275,12 @@ def _parts_of(model: PoseSegmentation, views: MeshViews, request: LabelRequest, 
     """(p,) part of each polygon of a mesh."""
     two_sides = request.sides == "two"
     min_share = None if model.preset == "paper" else request.min_share
+    stage = Message('Labels of "{character}"', character=views.name)
     parts = model.segment_polygons(
         views.described,
         views.polygons,
         min_share,
-        progress.part(0.0, SEGMENT_SHARE if two_sides else 1.0, Message('Labels of "{character}"', character=views.name)),
+        progress.part(0.0, SEGMENT_SHARE if two_sides else 1.0, stage),
         marked=views.body.marked,
     )
     if two_sides:

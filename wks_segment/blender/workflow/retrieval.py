@@ -1,4 +1,4 @@
-"""The paper's retrieval experiment on a folder of classes: learn some shapes of each, and ask for the class of others."""
+"""The paper's retrieval experiment: learn some shapes of each class in a folder, and find the class of the others."""
 
 from __future__ import annotations
 
@@ -60,9 +60,7 @@ def evaluate(folder: Path, settings: WKSSegmentSettings, n_learned: int, n_frame
             _check_class(model, poses, n_learned, limits)
             queries[name] = _learn_class(model, poses, n_learned, class_run)
         except UserError as error:
-            run.report.warn(
-                Message("The class {name} was left out: {reason}", name=name, reason=message_of(error))
-            )
+            run.report.warn(Message("The class {name} was left out: {reason}", name=name, reason=message_of(error)))
             continue
         models[name] = model
     if len(models) < 2:
@@ -80,9 +78,7 @@ def evaluate(folder: Path, settings: WKSSegmentSettings, n_learned: int, n_frame
         return retrieve(models, queries)
 
 
-def _check_class(
-    model: PoseSegmentation, poses: list[Pose], n_learned: int, limits: tuple[float, float]
-) -> None:
+def _check_class(model: PoseSegmentation, poses: list[Pose], n_learned: int, limits: tuple[float, float]) -> None:
     """UserError if there are too few shapes, or they are too large for the limits of minutes and memory."""
     if len(poses) <= n_learned:
         raise UserError(

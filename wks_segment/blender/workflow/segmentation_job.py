@@ -181,10 +181,9 @@ class SegmentationJob:
         if self.learns:
             names = list(dict.fromkeys(pose.character.name for pose in self.poses))
             first_names = ", ".join(names[:3])
-            origin = Message("From {names}", names=first_names + " …" * (len(names) > 3))
-            model_library.keep(settings, self.model, [origin, *self.report.facts[:3]], first_names, adds)
+            lines = [Message("From {names}", names=first_names + " …" * (len(names) > 3)), *self.report.facts[:3]]
+            model_library.keep(settings, self.model, lines, first_names, adds)
         elif self.first is not None:
             # The model is stored with this number of segments, so that applying it again gives the same ones.
-            origin = model_library.summary_of(settings)[0]
-            facts = [Message("{count} segments", count=self.model.n_segments_)]
-            model_library.keep(settings, self.model, [origin, *facts])
+            lines = [model_library.summary_of(settings)[0], Message("{count} segments", count=self.model.n_segments_)]
+            model_library.keep(settings, self.model, lines)

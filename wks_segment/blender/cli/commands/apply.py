@@ -6,13 +6,14 @@ import argparse
 from typing import Any
 
 from ....core import Cache, MemoryCache
-from ....core.poses.describe import Progress
+from ....core.progress import Progress
 from ...errors import UserError
 from ...scene import file_formats
 from ...workflow import model_library, pipeline
-from ...workflow.model_ranking import rank_poses, said
+from ...workflow.model_ranking import largest, rank_poses, verdict_message
+from ...workflow.pipeline import Run
 from ...workflow.report import Report
-from .common import cache_of, candidates_in, check_outputs, label, largest, read_poses, result_of, settings_of
+from .common import cache_of, candidates_in, check_outputs, label, read_poses, result_of, settings_of
 from .options import add_labeling, add_means, add_model, add_outputs, add_poses
 
 
@@ -43,18 +44,18 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
         pipeline.check_limits(largest(found), poses, settings_of(options))
         # What is described for the ranking serves labeling.
         cache = cache or MemoryCache()
-        ranking = rank_poses(found, poses, report, progress, cache, options.threads)
+        ranking = rank_poses(found, poses, Run(report, progress, cache, options.threads))
         model, name = found[ranking.best.index].model, found[ranking.best.index].name
         best = {"best": name, "verdict": ranking.verdict}
         if ranking.verdict != "sure":
-            report.warn(said(ranking, [candidate.name for candidate in found]))
-    report.tell_of(model)
+            report.warn(verdict_message(ranking, [candidate.name for candidate in found]))
+    report.add_model(model)
     settings = settings_of(options)
     model_library.add(settings, model, name, [f"From {name}", f"{model.n_segments_} segments"])
     if options.smoothness is not None:
         model.smoothness = settings.smoothness
     pipeline.check_limits(model, poses, settings)
-    described = pipeline.describe(model, poses, report, progress, cache=cache, workers=options.threads)
+    described = pipeline.describe(model, poses, Run(report, progress, cache, options.threads))
     label(model, poses, described, settings, options, report, progress)
     if options.output:
         file_formats.save_scene(options.output)

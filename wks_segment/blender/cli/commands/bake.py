@@ -9,14 +9,14 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ....core.poses.describe import Progress
+from ....core.progress import Progress
 from ...errors import UserError
 from ...outputs.bake import bake_id_maps
 from ...outputs.id_map import save
 from ...outputs.labels import labels_on
 from ...scene import file_formats
 from ...workflow import model_library, pipeline
-from ...workflow.pipeline import Wanted
+from ...workflow.pipeline import LabelRequest, Run
 from ...workflow.report import Report
 from .common import check_picture, read_poses, result_of, settings_of
 from .options import BAKE_OPTIONS, add_labeling, add_settings
@@ -59,13 +59,13 @@ def _bake(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
         if options.smoothness is not None:
             model.smoothness = settings.smoothness
         pipeline.check_limits(model, poses, settings)
-        described = pipeline.describe(model, poses, report, progress)
-        wanted = Wanted.of(settings, characters)
-        labels = pipeline.label(model, poses, described, wanted, report, progress)
-        pipeline.write(settings, labels, wanted, report)
+        run, request = Run(report, progress), LabelRequest.of(settings, characters)
+        described = pipeline.describe(model, poses, run)
+        labels = pipeline.label(model, poses, described, request, run)
+        pipeline.write(settings, labels, request, report)
     else:
         report.laplacians = ["none"] * len(poses)
-        report.tell_of_parts(np.concatenate([of_object for of_object in there if of_object is not None]))
+        report.add_labels(np.concatenate([of_object for of_object in there if of_object is not None]))
     written: dict[str, Path] = {}
     with report.stage("bake"):
         id_maps = [
@@ -73,7 +73,7 @@ def _bake(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
             for character in characters
             for id_map in bake_id_maps(
                 bpy.context, character, settings.style(), settings.bake_size, settings.bake_margin, options.unwrap,
-                report.warnings, progress,
+                report.warnings, progress.report,
             )
         ]  # fmt: skip
         for id_map in id_maps:

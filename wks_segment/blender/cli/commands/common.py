@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 
 from ....core import DiskCache, PartNotes, PoseSegmentation
-from ....core.poses.describe import Progress
+from ....core.progress import Progress
 from ...errors import UserError
 from ...outputs.overrides import merged
 from ...parts import part_ids
@@ -22,8 +22,8 @@ from ...scene.characters import Character, armature_of, group, mesh_objects
 from ...scene.pose_library import read_actions
 from ...scene.poses import Pose
 from ...workflow import model_library, pipeline
-from ...workflow.model_ranking import Candidate, of_files
-from ...workflow.pipeline import Wanted
+from ...workflow.model_ranking import NamedModel, models_in_files
+from ...workflow.pipeline import LabelRequest, Run
 from ...workflow.report import Report
 from ..terminal import table
 from .options import AUTOMATIC, BAKE_OPTIONS, OPTIONS, OUTPUT_FLAGS, OUTPUT_OPTIONS
@@ -54,19 +54,14 @@ def cache_of(options: argparse.Namespace) -> DiskCache | None:
         raise UserError(f"{options.cache}: it cannot be a cache: {error.strerror or error}") from error
 
 
-def candidates_in(folder: Path, report: Report) -> list[Candidate]:
+def candidates_in(folder: Path, report: Report) -> list[NamedModel]:
     """The models in a folder; UserError if there is none."""
     if not folder.is_dir():
         raise UserError(f"{folder}: there is no such folder")
-    candidates = of_files(model_library.in_folder(folder), report)
+    candidates = models_in_files(model_library.in_folder(folder), report)
     if not candidates:
         raise UserError(f"{folder}: there is no model in this folder that can be used")
     return candidates
-
-
-def largest(candidates: Sequence[Candidate]) -> PoseSegmentation:
-    """The model whose signature takes most."""
-    return max((each.model for each in candidates), key=lambda model: model.n_eigenpairs)
 
 
 def read_poses(options: argparse.Namespace, report: Report) -> list[Pose]:
@@ -154,15 +149,14 @@ def label(
     options: argparse.Namespace, report: Report, progress: Progress, renumbered: bool = False,
 ) -> None:  # fmt: skip
     """Label the poses by a model, write that to their meshes, and render them, as far as is asked for."""
-
-    def at_end(stage: str, share: float) -> None:
-        progress(stage, 1.0)
-
-    wanted = Wanted.of(settings, (pose.character for pose in poses))
-    labels = pipeline.label(model, poses, described, wanted, report, at_end)
+    request, at_end = (
+        LabelRequest.of(settings, (pose.character for pose in poses)),
+        Run(report, progress.part(1.0, 1.0)),
+    )
+    labels = pipeline.label(model, poses, described, request, at_end)
     if options.output:
-        soft = pipeline.soften(model, poses, described, labels, wanted, report, at_end)
-        pipeline.write(settings, labels, wanted, report, soft, renumbered)
+        soft = pipeline.soften(model, poses, described, labels, request, at_end)
+        pipeline.write(settings, labels, request, report, soft, renumbered)
     elif renumbered:
         settings.keep_notes(PartNotes())
     if options.render:

@@ -8,7 +8,7 @@ from typing import Any
 
 import bpy
 
-from ....core.poses.describe import Progress
+from ....core.progress import Progress
 from ...errors import UserError
 from ...scene import file_formats
 from .. import demo_scene

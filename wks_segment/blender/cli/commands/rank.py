@@ -7,14 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from ....core import Ranking
-from ....core.poses.describe import Progress
+from ....core.progress import Progress
 from ...render.confusion_matrix import render_matrix
 from ...workflow import pipeline
-from ...workflow.model_ranking import Candidate, rank_poses, said
+from ...workflow.model_ranking import NamedModel, largest, rank_poses, verdict_message
+from ...workflow.pipeline import Run
 from ...workflow.report import Report
 from ...workflow.retrieval import evaluate
 from ..terminal import table
-from .common import cache_of, candidates_in, check_picture, largest, read_poses, settings_of
+from .common import cache_of, candidates_in, check_picture, read_poses, settings_of
 from .options import add_means, add_poses, add_settings, within
 
 LEARNED, FRAMES = 5, 8
@@ -57,25 +58,21 @@ def _rank_files(options: argparse.Namespace, progress: Progress) -> dict[str, An
     report, cache = Report([]), cache_of(options)
     candidates = candidates_in(options.models, report)
     results = []
-    for number, path in enumerate(options.files):
-
-        def tick(stage: str, share: float, begun: int = number) -> None:
-            progress(stage, (begun + share) / len(options.files))
-
+    for path, file_progress in progress.each(options.files, "Reading"):
         poses = read_poses(argparse.Namespace(**vars(options) | {"files": [path]}), report)
         pipeline.check_limits(largest(candidates), poses, settings_of(options))
         for character in dict.fromkeys(pose.character for pose in poses):
             mine = [pose for pose in poses if pose.character == character]
-            ranking = rank_poses(candidates, mine, report, tick, cache, options.threads)
+            ranking = rank_poses(candidates, mine, Run(report, file_progress, cache, options.threads))
             results.append({"file": str(path), "character": character.name} | _result(ranking, candidates))
     return {"rankings": results, "seconds": _seconds(report), "warnings": report.warnings}
 
 
-def _result(ranking: Ranking, candidates: list[Candidate]) -> dict[str, Any]:
+def _result(ranking: Ranking, candidates: list[NamedModel]) -> dict[str, Any]:
     names = [candidate.name for candidate in candidates]
     return {
         "verdict": ranking.verdict,
-        "says": said(ranking, names),
+        "says": verdict_message(ranking, names),
         "models": [
             {
                 "name": names[place.index],
@@ -95,9 +92,8 @@ def _evaluate(options: argparse.Namespace, progress: Progress) -> dict[str, Any]
     if first is not None or last is not None:
         options.usage("with --evaluate, --frames takes a COUNT only: each file has its own animation")
     report = Report([])
-    retrieval = evaluate(
-        options.evaluate, settings_of(options), options.learned, count, report, progress, cache_of(options)
-    )
+    run = Run(report, progress, cache_of(options))
+    retrieval = evaluate(options.evaluate, settings_of(options), options.learned, count, run)
     if options.picture:
         with report.stage("render"):
             render_matrix(retrieval, options.picture)

@@ -6,9 +6,10 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ....core.poses.describe import Progress
+from ....core.progress import Progress
 from ...scene import file_formats
 from ...workflow import model_library, pipeline
+from ...workflow.pipeline import Run
 from ...workflow.report import Report, pose_warnings, segment_warnings
 from .common import cache_of, check_outputs, label, read_poses, result_of, save_model, settings_of
 from .options import add_means, add_outputs, add_poses, add_settings
@@ -41,10 +42,10 @@ def _segment(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     settings = settings_of(options)
     model = settings.new_model()
     pipeline.check_limits(model, poses, settings)
-    described = pipeline.learn(model, poses, report, progress, cache, options.threads)
+    described = pipeline.learn(model, poses, Run(report, progress, cache, options.threads))
     if options.model:
         save_model(model, options.model)
-    model_library.aside(settings)
+    model_library.store_active(settings)
     if options.output or options.render:
         label(model, poses, described, settings, options, report, progress, renumbered=True)
         report.warnings += segment_warnings(model, report)
