@@ -78,7 +78,7 @@ def run() -> dict[str, Any]:
 def watched(work: SegmentationJob) -> tuple[list[dict[str, Any]], Job]:
     """The longest gaps between two looks while the work is computed, and the job."""
     gaps: list[dict[str, Any]] = []
-    job = Job("Learn and Segment", work.compute, work.watch.glance)
+    job = Job("Learn and Segment", work.compute, work.guard.glance)
     last, over = time.perf_counter(), False
     ticks: list[tuple[float, str, float]] = []
     while not over:

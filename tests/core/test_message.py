@@ -49,7 +49,9 @@ def test_translated(message, expected):
     assert message.translated(lambda template: template) == message
 
 
-@pytest.mark.parametrize("mistake", ["{other}", "{0}", "{path", "{path.name}", "{path[0][1]}", "{path:.2f}", "{path!x}"])
+@pytest.mark.parametrize(
+    "mistake", ["{other}", "{0}", "{path", "{path.name}", "{path[0][1]}", "{path:.2f}", "{path!x}"]
+)
 def test_a_translation_that_cannot_be_filled_in_is_english(mistake):
     message = Message("{path}: there is no such file", path="a.json")
     assert message.translated(lambda template: mistake) == message

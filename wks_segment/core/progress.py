@@ -129,7 +129,7 @@ class _ShareOnly:
 class _HighestShare:
     """Report of the highest share so far."""
 
-    def __init__(self, report: Report) -> None:
+    def __init__(self, report: ReportFunction) -> None:
         self._report, self._highest = report, 0.0
 
     def __call__(self, stage: str, share: float) -> None:

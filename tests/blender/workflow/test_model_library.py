@@ -210,7 +210,7 @@ def test_a_model_in_no_row_is_not_lost_either(poses, settings):
 def test_a_damaged_row_does_no_harm(two):
     two.used_model = 7
     two.active_model = 1
-    assert model_library.in_use(two) is not None
+    assert model_library.active_row(two) is not None
     assert two.model
 
 
