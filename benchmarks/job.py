@@ -77,7 +77,7 @@ def run() -> dict[str, dict[str, float]]:
     timed("mixture", lambda: model.fit(described))
     request = timed("read meshes", lambda: LabelRequest.of(settings, (pose.character for pose in poses)))
     labels = timed("label", lambda: pipeline.label(model, poses, described, request, Run(report)))
-    timed("write", lambda: pipeline.write(settings, labels, request, report))
+    timed("write", lambda: pipeline.write_outputs(settings, labels, request, report))
     return stages
 
 

@@ -20,7 +20,7 @@ import bpy
 
 import wks_segment.blender
 from benchmarks import shapes
-from wks_segment.blender.workflow.background_job import Job
+from wks_segment.blender.workflow.background_job import BackgroundJob
 from wks_segment.blender.workflow.segmentation_job import SegmentationJob
 from wks_segment.core import MemoryCache
 
@@ -75,10 +75,10 @@ def run() -> dict[str, Any]:
     return {"read": read, "write": written, "stages": work.report.seconds, "longest": gaps}
 
 
-def watched(work: SegmentationJob) -> tuple[list[dict[str, Any]], Job]:
+def watched(work: SegmentationJob) -> tuple[list[dict[str, Any]], BackgroundJob]:
     """The longest gaps between two looks while the work is computed, and the job."""
     gaps: list[dict[str, Any]] = []
-    job = Job("Learn and Segment", work.compute, work.guard.glance)
+    job = BackgroundJob("Learn and Segment", work.compute, work.guard.glance)
     last, over = time.perf_counter(), False
     ticks: list[tuple[float, str, float]] = []
     while not over:

@@ -103,7 +103,7 @@ _commands: list[Any] = []
 
 def register() -> None:
     """Called by Blender when the extension is enabled."""
-    changes.connect(PropertyChanges())
+    changes.set_listener(PropertyChanges())
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.Scene.wks_segment = bpy.props.PointerProperty(type=WKSSegmentSettings)
@@ -125,4 +125,4 @@ def unregister() -> None:
     del bpy.types.Scene.wks_segment
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
-    changes.disconnect()
+    changes.remove_listener()

@@ -173,9 +173,9 @@ def test_each_place_has_its_own_setting(monkeypatch, function):
 
 def test_job_and_panel_speak_german(extension, monkeypatch):
     from wks_segment.blender.ui.main_panel import job_texts, wrapped_lines
-    from wks_segment.blender.workflow.background_job import Job
+    from wks_segment.blender.workflow.background_job import BackgroundJob
 
-    job = Job("Learn and Segment", lambda progress: None, lambda: None)
+    job = BackgroundJob("Learn and Segment", lambda progress: None, lambda: None)
     job.wait(5)
     job.stage, job.share = 'Signature of "Fox, frame 12" (3 of 5)', 0.375
     assert job_texts(job) == ("Signature of Fox, frame 12 · 3 of 5", "38 %")

@@ -22,7 +22,7 @@ from wks_segment.blender.operators.apply import WKS_SEGMENT_OT_apply
 from wks_segment.blender.operators.learn import WKS_SEGMENT_OT_learn
 from wks_segment.blender.ui import main_panel
 from wks_segment.blender.workflow import background_job, live_session
-from wks_segment.blender.workflow.background_job import JOB_RUNNING, Job, TimeLeft, job_holder
+from wks_segment.blender.workflow.background_job import JOB_RUNNING, BackgroundJob, TimeLeft, job_holder
 from wks_segment.blender.workflow.segmentation_job import SegmentationJob
 from wks_segment.core import MemoryCache
 from wks_segment.core.progress import Progress
@@ -63,7 +63,7 @@ def at(monkeypatch):
     goes_on = threading.Event()
 
     def hold(stage, operator=LEARN, **properties):
-        reached, original = threading.Event(), Job._report
+        reached, original = threading.Event(), BackgroundJob._report
 
         def progress(self, now, share):
             if now.startswith(stage) and not reached.is_set():
@@ -71,7 +71,7 @@ def at(monkeypatch):
                 assert goes_on.wait(LONG)
             original(self, now, share)
 
-        monkeypatch.setattr(Job, "_report", progress)
+        monkeypatch.setattr(BackgroundJob, "_report", progress)
         ran = Ran(operator, **properties)
         ran.begin(bpy.context)
         assert reached.wait(LONG)

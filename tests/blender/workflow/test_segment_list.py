@@ -54,7 +54,7 @@ def write(settings, *objects):
 def write_labels(settings, labels, report=None, renumbered=False):
     """Write parts of polygons, as a model would give them."""
     request = pipeline.LabelRequest.of(settings, labels)
-    pipeline.write(settings, labels, request, report or Report([]), renumbered=renumbered)
+    pipeline.write_outputs(settings, labels, request, report or Report([]), renumbered=renumbered)
 
 
 @pytest.fixture

@@ -76,7 +76,7 @@ def run(
     together = pipeline.label(model, training, described, request, at_half)
     soft = pipeline.soften(model, training, described, together, request, at_half)
     model_library.store_active(settings)
-    pipeline.write(settings, together, request, report, soft, renumbered=True)
+    pipeline.write_outputs(settings, together, request, report, soft, renumbered=True)
     counted = report.n_segments, report.parts
     described += pipeline.describe(model, others, Run(report, progress.part(0.5, 0.9)))
     after = Run(report, progress.part(0.9, 0.9))

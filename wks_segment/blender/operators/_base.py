@@ -19,7 +19,7 @@ from ..scene.change_guard import Watch
 from ..scene.poses import Pose
 from ..ui.messages import in_panel
 from ..workflow import pipeline
-from ..workflow.background_job import Job, job_holder, redraw_sidebars
+from ..workflow.background_job import BackgroundJob, job_holder, redraw_sidebars
 from ..workflow.live_session import session_of
 from ..workflow.segmentation_job import SegmentationJob
 from . import _report
@@ -86,7 +86,7 @@ class JobOperator(BaseOperator, Generic[J]):
     confirmed: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
 
     bl_label: str
-    job: Job
+    job: BackgroundJob
     computed: J
     asked = False
     """Whether the next call of `execute` is the answer to the question about a large job."""

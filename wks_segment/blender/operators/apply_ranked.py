@@ -17,7 +17,7 @@ from . import _needs
 from ._base import LabelOperator
 
 
-def _ranking(context: bpy.types.Context) -> Message | None:
+def _stored_ranking(context: bpy.types.Context) -> Message | None:
     """A ranking in this scene."""
     return None if context.scene.wks_segment.ranking else Message("No ranking yet: use Rank Models")
 
@@ -29,7 +29,7 @@ class WKS_SEGMENT_OT_apply_ranked(LabelOperator, bpy.types.Operator):
     bl_label = "Apply Ranked Model"
     bl_options = {"REGISTER", "UNDO"}
 
-    needs = (_ranking, _needs.no_job, _needs.object_mode)
+    needs = (_stored_ranking, _needs.no_job, _needs.object_mode)
     verb = "Applied"
     index: IntProperty(
         name="Rank", description="Place of the model in the ranking, 0 for the best", min=0, options={"SKIP_SAVE"}
@@ -60,7 +60,7 @@ class WKS_SEGMENT_OT_apply_ranked(LabelOperator, bpy.types.Operator):
         else:
             model, file = self.computed.model, Path(item.path).name
             summary = [Message("From {names}", names=file), Message("{count} segments", count=model.n_segments_)]
-            model_library.add(settings, model, item.name, summary)
+            model_library.add_model(settings, model, item.name, summary)
             # The model is in the scene now, under a name that may have got a number.
             item.name, item.path = settings.models[settings.used_model].name, ""
         return super().written(context)

@@ -62,7 +62,7 @@ class WKS_SEGMENT_OT_forget_faces(BaseOperator, bpy.types.Operator):
         settings = context.scene.wks_segment
         selected_only = context.mode == "EDIT_MESH"
         objects, count = segment_list.labeled(settings), 0
-        with segment_list.object_mode(context):
+        with segment_list.leaving_edit_mode(context):
             for mesh in segment_list.meshes_of(objects):
                 parts = by_hand(mesh)
                 forgotten = (parts >= 0) & (read_bools(mesh.polygons, "select") | (not selected_only))
@@ -78,7 +78,7 @@ def _assign(operator: bpy.types.Operator, context: bpy.types.Context, part: int 
     settings = context.scene.wks_segment
     # Objects that are not in Edit Mode can have selected faces as well, which are not visible.
     objects = [obj for obj in segment_list.labeled(settings) if obj.mode == "EDIT"]
-    with segment_list.object_mode(context):
+    with segment_list.leaving_edit_mode(context):
         selected = {mesh: read_bools(mesh.polygons, "select") for mesh in segment_list.meshes_of(objects)}
         count = sum(int(faces.sum()) for faces in selected.values())
         if count:

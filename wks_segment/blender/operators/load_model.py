@@ -34,7 +34,7 @@ class WKS_SEGMENT_OT_load_model(BaseOperator, bpy.types.Operator, ImportHelper):
             raise UserError("{file} was not loaded: {reason}", file=path.name, reason=message_of(error)) from error
         count = model.n_segments_
         summary = [Message("From {names}", names=path.name), Message("{count} segments", count=count)]
-        model_library.add(context.scene.wks_segment, model, path.stem, summary)
+        model_library.add_model(context.scene.wks_segment, model, path.stem, summary)
         _report.tell(
             self, {"INFO"}, Message("Loaded a model of {count} segments from {file}", count=count, file=path.name)
         )

@@ -42,7 +42,7 @@ class WKS_SEGMENT_OT_segments_from(BaseOperator, bpy.types.Operator):
         for mesh in (obj.data for character in labels for obj in character.objects):
             if has_labels(mesh):
                 keep_by_hand(mesh, np.full(len(mesh.polygons), -1))
-        pipeline.write(settings, labels, LabelRequest.of(settings, labels), report, soft)
+        pipeline.write_outputs(settings, labels, LabelRequest.of(settings, labels), report, soft)
         if settings.write_colors:
             _report.show_colors(context)
         _report.tell_warnings(self, report.warnings)

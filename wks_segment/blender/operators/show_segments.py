@@ -30,7 +30,7 @@ class _HidesFaces(BaseOperator):
     def run(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
         meshes, count = segment_list.meshes_of(segment_list.labeled(settings)), 0
-        with segment_list.object_mode(context):
+        with segment_list.leaving_edit_mode(context):
             for mesh in meshes:
                 labels = labels_on(mesh)
                 if labels is not None:

@@ -52,7 +52,7 @@ class WKS_SEGMENT_OT_transfer(BaseOperator, bpy.types.Operator):
                 (character,) = group([obj])
                 (target,) = reader.read_objects(context, [character])
                 labels[character] = pipeline.filled(transferred(source, target), Body.of(character))
-        pipeline.write(settings, labels, LabelRequest.of(settings, labels), report)
+        pipeline.write_outputs(settings, labels, LabelRequest.of(settings, labels), report)
         if settings.write_colors:
             _report.show_colors(context)
         _report.tell_warnings(self, report.warnings)

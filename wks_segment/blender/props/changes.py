@@ -1,7 +1,7 @@
 """Tells the packages above that a property has changed.
 
 Blender wants the functions that set and update a property where the property is defined. What they do needs meshes,
-the live session and the list of models, which are defined above the properties. So `registration` connects a
+the live session and the list of models, which are defined above the properties. So `registration` sets a
 `PropertyListener`, and the properties call it.
 """
 
@@ -32,12 +32,12 @@ class PropertyListener(Protocol):
 _connected: list[PropertyListener] = []
 
 
-def connect(new: PropertyListener) -> None:
+def set_listener(new: PropertyListener) -> None:
     """Let the properties call this listener only."""
     _connected[:] = [new]
 
 
-def disconnect() -> None:
+def remove_listener() -> None:
     """Forget the listener."""
     _connected.clear()
 

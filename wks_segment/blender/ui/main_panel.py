@@ -10,7 +10,7 @@ import bpy
 
 from ...core.message import Message
 from ..props.presets import WKS_SEGMENT_PT_presets
-from ..workflow.background_job import Job, job_holder
+from ..workflow.background_job import BackgroundJob, job_holder
 from ..workflow.live_session import session_of
 from .messages import in_panel
 
@@ -174,7 +174,7 @@ class WKS_SEGMENT_PT_advanced(SubPanel, bpy.types.Panel):
         )
 
 
-def job_texts(job: Job) -> tuple[str, str]:
+def job_texts(job: BackgroundJob) -> tuple[str, str]:
     """Stage and time left of a job in the user's language: "Signature of Fox · 3 of 5" and "about 20 s left".
 
     The share that is done as long as the time left is unknown, and why the job ends once it was asked to.

@@ -1,6 +1,6 @@
 """Jobs that compute in a thread while the window stays responsive. One job runs at a time; `JobHolder` holds it.
 
-The thread must not touch Blender. Blender's own thread looks after the job by calling `Job.step` from a timer.
+The thread must not touch Blender. Blender's own thread looks after the job: a timer calls `BackgroundJob.step`.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class TimeLeft:
         return Message("about {minutes} min left", minutes=round(self._left / 60))
 
 
-class Job:
+class BackgroundJob:
     """A computation in a thread.
 
     Parameters
@@ -162,7 +162,7 @@ class JobHolder:
     """Holds the running job and why the last one ended; ends the job when Blender takes away its objects."""
 
     def __init__(self) -> None:
-        self.job: Job | None = None
+        self.job: BackgroundJob | None = None
         self.message = ""
         """Why the last job ended early; empty if it did not."""
         self._timer: Any = None
@@ -174,11 +174,11 @@ class JobHolder:
         for handlers, function in self._handlers:
             handlers.append(function)
 
-    def start(self, name: str, compute: Callable[[Progress], None], check: Callable[[], None]) -> Job:
-        """Start a `Job`; UserError if one is running."""
+    def start(self, name: str, compute: Callable[[Progress], None], check: Callable[[], None]) -> BackgroundJob:
+        """Start a `BackgroundJob`; UserError if one is running."""
         if self.job is not None:
             raise UserError(JOB_RUNNING)
-        self.job, self.message = Job(name, compute, check), ""
+        self.job, self.message = BackgroundJob(name, compute, check), ""
         return self.job
 
     def start_timer(self, context: bpy.types.Context) -> None:

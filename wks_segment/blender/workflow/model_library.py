@@ -91,7 +91,7 @@ def store_active(settings: WKSSegmentSettings) -> None:
             setattr(row, name, getattr(settings, place))
 
 
-def add(settings: WKSSegmentSettings, model: PoseSegmentation, name: str, summary: Sequence[str]) -> None:
+def add_model(settings: WKSSegmentSettings, model: PoseSegmentation, name: str, summary: Sequence[str]) -> None:
     """Add a model with its own names and colors to the list, and use it."""
     store_active(settings)
     settings.keep_notes(model.part_notes_)

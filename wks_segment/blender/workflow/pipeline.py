@@ -320,7 +320,7 @@ def poses_by_mesh(poses: Sequence[Pose]) -> list[list[int]]:
     return [[i for i, other in enumerate(meshes) if other == mesh] for mesh in dict.fromkeys(meshes)]
 
 
-def write(
+def write_outputs(
     settings: WKSSegmentSettings, labels: dict[Character, IntArray], request: LabelRequest, report: Report,
     weights: dict[Character, dict[int, FloatArray]] | None = None, renumbered: bool = False,
 ) -> None:  # fmt: skip

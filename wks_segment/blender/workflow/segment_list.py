@@ -137,7 +137,7 @@ def restyle(settings: WKSSegmentSettings, part: int, name: bool = True, color: b
     meshes = meshes_of(labeled(settings, everywhere=True))
     for mesh in meshes if name else ():
         rename_group(mesh, mesh[NOTE], part, style)
-    with object_mode(bpy.context) if color else nullcontext():
+    with leaving_edit_mode(bpy.context) if color else nullcontext():
         for mesh in meshes if color else ():
             _recolor_faces(mesh, part, style)
     for material in bpy.data.materials:
@@ -211,7 +211,7 @@ def _successors(labels: Mapping[Character, IntArray]) -> dict[int, int]:
 
 
 @contextmanager
-def object_mode(context: bpy.types.Context) -> Iterator[None]:
+def leaving_edit_mode(context: bpy.types.Context) -> Iterator[None]:
     """Leave Edit Mode for the block, because Blender reads and writes whole attributes only outside it."""
     if context.mode != "EDIT_MESH":
         yield

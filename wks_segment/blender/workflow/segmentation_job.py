@@ -177,7 +177,7 @@ class SegmentationJob:
         if adds:
             # Names and colors belong to the other model, and are stored before they are carried over to this one.
             model_library.store_active(settings)
-        pipeline.write(settings, self.labels, self.request, self.report, self._weights, renumbered)
+        pipeline.write_outputs(settings, self.labels, self.request, self.report, self._weights, renumbered)
         if self.learns:
             names = list(dict.fromkeys(pose.character.name for pose in self.poses))
             first_names = ", ".join(names[:3])

@@ -51,7 +51,7 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
             report.warn(verdict_message(ranking, [candidate.name for candidate in found]))
     report.add_model(model)
     settings = settings_of(options)
-    model_library.add(settings, model, name, [f"From {name}", f"{model.n_segments_} segments"])
+    model_library.add_model(settings, model, name, [f"From {name}", f"{model.n_segments_} segments"])
     if options.smoothness is not None:
         model.smoothness = settings.smoothness
     pipeline.check_limits(model, poses, settings)

@@ -62,7 +62,7 @@ def _bake(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
         run, request = Run(report, progress), LabelRequest.of(settings, characters)
         described = pipeline.describe(model, poses, run)
         labels = pipeline.label(model, poses, described, request, run)
-        pipeline.write(settings, labels, request, report)
+        pipeline.write_outputs(settings, labels, request, report)
     else:
         report.laplacians = ["none"] * len(poses)
         report.add_labels(np.concatenate([of_object for of_object in there if of_object is not None]))

@@ -156,7 +156,7 @@ def label(
     labels = pipeline.label(model, poses, described, request, at_end)
     if options.output:
         soft = pipeline.soften(model, poses, described, labels, request, at_end)
-        pipeline.write(settings, labels, request, report, soft, renumbered)
+        pipeline.write_outputs(settings, labels, request, report, soft, renumbered)
     elif renumbered:
         settings.keep_notes(PartNotes())
     if options.render:
