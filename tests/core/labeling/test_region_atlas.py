@@ -14,6 +14,12 @@ def limb(name, subdivisions=4, radius=0.15):
     return np.arccos(np.clip(sphere.vertices[sphere.faces].mean(axis=1) @ axis, -1, 1)) < radius
 
 
+@pytest.fixture(scope="module")
+def usual(model):
+    """Regions of the figure at rest."""
+    return model.segment_regions(figure())
+
+
 def name_of(names, faces):
     values, counts = np.unique(names[faces], return_counts=True)
     return int(values[counts.argmax()])
@@ -25,8 +31,7 @@ def model():
     return PoseSegmentation(6, n_eigenpairs=100, n_energies=60).fit(poses)
 
 
-def test_left_and_right_are_two_regions_and_the_same_two_in_unseen_poses(model):
-    usual = model.segment_regions(figure())
+def test_left_and_right_are_two_regions_and_the_same_two_in_unseen_poses(model, usual):
     for left, right in ((0.4, -0.4), (-0.5, 0.5), (0.0, 0.7)):
         mesh = figure(left, right)
         found = model.segment_regions(mesh)
@@ -37,8 +42,7 @@ def test_left_and_right_are_two_regions_and_the_same_two_in_unseen_poses(model):
             assert names[0] != names[1]
 
 
-def test_names_are_the_same_on_another_meshing_in_another_place_and_inside_out(model):
-    usual = model.segment_regions(figure())
+def test_names_are_the_same_on_another_meshing_in_another_place_and_inside_out(model, usual):
     fine = figure(0.3, -0.2, 5)
     turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
     order = np.random.default_rng(0).permutation(fine.n_vertices)
@@ -56,8 +60,8 @@ def test_a_mirrored_body_has_its_left_where_the_other_had_its_right(model):
     assert name_of(mirrored, limb("right leg")) == name_of(usual, limb("left leg"))
 
 
-def test_left_is_where_x_points(model):
-    names, side = model.segment_regions(figure()), model.regions_.side
+def test_left_is_where_x_points(model, usual):
+    names, side = usual, model.regions_.side
     for one in ("arm", "leg"):
         assert side[name_of(names, limb(f"left {one}"))] == 1
         assert side[name_of(names, limb(f"right {one}"))] == -1

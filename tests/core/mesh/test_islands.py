@@ -7,8 +7,8 @@ from shapes import icosphere, together
 from wks_segment.core import PoseSegmentation, TriangleMesh, connect, prepare_surface
 
 
-def ball(x, y=0.0, z=0.0, size=1.0):
-    sphere = icosphere(3)
+def ball(x, y=0.0, z=0.0, size=1.0, subdivisions=3):
+    sphere = icosphere(subdivisions)
     return TriangleMesh(size * sphere.vertices + (x, y, z), sphere.faces)
 
 
@@ -61,7 +61,7 @@ def test_equal_islands_in_different_places_get_different_labels_if_joined():
 
 def test_hundreds_of_distant_islands_are_tied():
     generator = np.random.default_rng(0)
-    mesh = together(*(ball(*generator.uniform(0, 200, 3), 0.5) for _ in range(300)))
+    mesh = together(*(ball(*generator.uniform(0, 200, 3), 0.5, 2) for _ in range(300)))
     connection = connect(mesh)
     assert prepare_surface(mesh, connection=connection).n_components == 1
     assert len(tied_islands(connection, mesh.faces)) == 299
