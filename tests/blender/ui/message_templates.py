@@ -1,9 +1,8 @@
 """Finds the texts in the code that a person can see in the window: the keys of the table of translations.
 
 A text counts if it is handed to what shows it (`tell`, `explain`, `in_panel` …), to an error, to a warning, to a step
-of `Progress`, or to `Message`, or if it is a sentence that a function returns. It must be a constant: a template with named
-fields.
-`cli` and `render` are left out, for they speak on the terminal only, and so are the errors of `INTERNAL`.
+of `Progress`, or to `Message`, or if it is a sentence that a function returns. It must be a constant: a template with
+named fields. `cli` and `render` are left out, for they speak on the terminal only, and so are errors of `INTERNAL`.
 """
 
 import ast
