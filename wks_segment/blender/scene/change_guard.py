@@ -33,7 +33,7 @@ class Watch:
         for member, (_, content) in self._states.items():
             obj = member.found()
             if obj is not None and _content(obj.data) != content:
-                raise ChangedError(f'the mesh of "{member.name}" was edited')
+                raise ChangedError('the mesh of "{name}" was edited', name=member.name)
 
     def scene(self) -> bpy.types.Scene:
         """The scene; ChangedError if it is gone."""
@@ -42,7 +42,7 @@ class Watch:
         if scene is None or scene.session_uid != uid:
             scene = next((other for other in bpy.data.scenes if other.session_uid == uid), None)
         if scene is None:
-            raise ChangedError(f'the scene "{name}" was deleted')
+            raise ChangedError('the scene "{name}" was deleted', name=name)
         return scene
 
 
@@ -53,14 +53,14 @@ def _state(obj: bpy.types.Object) -> tuple[str, int, int]:
 
 def _check(member: Member, obj: bpy.types.Object | None, state: tuple[str, int, int]) -> None:
     if obj is None:
-        raise ChangedError(f'"{member.name}" was deleted')
+        raise ChangedError('"{name}" was deleted', name=member.name)
     if obj.data.session_uid != member.mesh_uid:
-        raise ChangedError(f'"{member.name}" got another mesh')
+        raise ChangedError('"{name}" has another mesh now', name=member.name)
     mode, *size = _state(obj)
     if mode != state[0]:
-        raise ChangedError(f'"{member.name}" went into {mode.replace("_", " ").title()} Mode')
+        raise ChangedError('"{name}" went into {mode} Mode', name=member.name, mode=mode.replace("_", " ").title())
     if tuple(size) != state[1:]:
-        raise ChangedError(f'the mesh of "{member.name}" was edited')
+        raise ChangedError('the mesh of "{name}" was edited', name=member.name)
 
 
 def _content(mesh: bpy.types.Mesh) -> bytes:

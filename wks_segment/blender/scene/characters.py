@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import bpy
 
+from ...core.message import Message
 from ..errors import UserError
 
 CONVERTIBLE = {
@@ -65,9 +66,9 @@ class Character:
             If one is gone.
         """
         found = {member.name: member.found() for member in self.members}
-        gone = ", ".join(f'"{name}"' for name, obj in found.items() if obj is None)
-        if gone:
-            raise UserError(f"{gone} is gone")
+        missing = [name for name, obj in found.items() if obj is None]
+        if missing:
+            raise UserError("{names} is gone", names=quoted(missing))
         return tuple(found.values())
 
     @property
@@ -135,13 +136,21 @@ def with_rigged(selected: Iterable[bpy.types.Object], visible: Iterable[bpy.type
     return chosen
 
 
+def quoted(names: Iterable[str]) -> str:
+    """Names in quotes, with commas between them."""
+    return ", ".join(f'"{name}"' for name in names)
+
+
 def why_no_mesh(objects: Iterable[bpy.types.Object]) -> str:
     """What to do to get a mesh, if none of the objects is one."""
     for obj in objects:
         if obj.type in CONVERTIBLE:
-            return f'"{obj.name}" is a {CONVERTIBLE[obj.type]}: convert it first (Object > Convert > Mesh)'
+            template = '"{name}" is a {type}: convert it first (Object > Convert > Mesh)'
+            return Message(template, name=obj.name, type=Message(CONVERTIBLE[obj.type]))
         if obj.type == "EMPTY" and obj.instance_type == "COLLECTION":
-            return f'"{obj.name}" is an instance: make it real first (Object > Apply > Make Instances Real)'
+            return Message(
+                '"{name}" is an instance: make it real first (Object > Apply > Make Instances Real)', name=obj.name
+            )
     return "Select the mesh of a character first"
 
 
@@ -172,9 +181,11 @@ def group(objects: Sequence[bpy.types.Object], together: bool = False) -> list[C
         raise UserError("No mesh object to work on: select the character's mesh")
     for obj in objects:
         if obj.library is not None or obj.data.library is not None:
-            raise UserError(f'"{obj.name}" is linked from another file: make it local first (Object > Relations)')
+            raise UserError(
+                '"{name}" is linked from another file: make it local first (Object > Relations)', name=obj.name
+            )
         if obj.mode == "EDIT":
-            raise UserError(f'"{obj.name}" is in Edit Mode: leave it first (Tab)')
+            raise UserError('"{name}" is in Edit Mode: leave it first (Tab)', name=obj.name)
     if together:
         return [Character(tuple(objects))]
     by_body: dict[bpy.types.Object, list[bpy.types.Object]] = {}

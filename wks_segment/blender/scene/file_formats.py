@@ -59,9 +59,9 @@ def open_files(paths: list[Path]) -> list[list[bpy.types.Object]]:
     """
     for path in paths:
         if not path.is_file():
-            raise UserError(f"{path}: there is no such file")
+            raise UserError("{path}: there is no such file", path=path)
         if path.suffix.lower() not in IMPORTERS:
-            raise UserError(f"{path}: unknown format; known are {', '.join(IMPORTERS)}")
+            raise UserError("{path}: unknown format; known are {formats}", path=path, formats=", ".join(IMPORTERS))
     if len(paths) == 1 and paths[0].suffix.lower() == ".blend":
         _try(lambda path: bpy.ops.wm.open_mainfile(filepath=path, load_ui=False), paths[0])
         if bpy.context.object is not None and bpy.context.object.mode != "OBJECT":
@@ -83,22 +83,22 @@ def _try(reader: Callable[[str], object], path: Path) -> None:
     try:
         reader(str(path.resolve()))
     except (RuntimeError, OSError) as error:
-        raise UserError(f"{path}: Blender cannot read it: {str(error).strip()}") from error
+        raise UserError("{path}: Blender cannot read it: {reason}", path=path, reason=str(error).strip()) from error
 
 
 def check_output(path: Path) -> None:
     """UserError unless a scene can be written there, before the work begins."""
     if path.suffix.lower() not in EXPORTERS:
-        raise UserError(f"{path}: unknown format to write; known are {', '.join(EXPORTERS)}")
+        raise UserError("{path}: unknown format to write; known are {formats}", path=path, formats=", ".join(EXPORTERS))
     check_folder(path)
 
 
 def check_folder(path: Path) -> None:
     """UserError unless the folder of a file is there."""
     if not path.resolve().parent.is_dir():
-        raise UserError(f"{path}: the folder {path.resolve().parent} does not exist")
+        raise UserError("{path}: the folder {folder} does not exist", path=path, folder=path.resolve().parent)
     if path.is_dir():
-        raise UserError(f"{path}: this is a folder, give the name of a file")
+        raise UserError("{path}: this is a folder, give the name of a file", path=path)
 
 
 def save_scene(path: Path) -> None:
@@ -106,6 +106,6 @@ def save_scene(path: Path) -> None:
     try:
         EXPORTERS[path.suffix.lower()](str(path.resolve()))
     except (RuntimeError, OSError) as error:
-        raise UserError(f"{path}: it could not be written: {str(error).strip()}") from error
+        raise UserError("{path}: it could not be written: {reason}", path=path, reason=str(error).strip()) from error
     if not path.is_file():
-        raise UserError(f"{path}: it could not be written")
+        raise UserError("{path}: it could not be written", path=path)

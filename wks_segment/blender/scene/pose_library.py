@@ -30,13 +30,16 @@ def read_actions(context: bpy.types.Context, character: Character, count: int) -
     """
     armature = next((found for found in map(armature_of, character.objects) if found is not None), None)
     if armature is None:
-        raise UserError(f'"{character.name}" has no armature that a pose could move: take poses from elsewhere')
+        raise UserError(
+            '"{name}" has no armature that a pose could move: take poses from elsewhere', name=character.name
+        )
     actions = [action for action in bpy.data.actions if _bones(action) & set(armature.pose.bones.keys())]
     actions = [action for action in actions if action.asset_data is not None] or actions
     if not actions:
         raise UserError(
-            f'There is no pose for "{armature.name}" in this file: create pose assets of it (Pose > Create Pose '
-            "Asset), or take poses from elsewhere"
+            'There is no pose for "{name}" in this file: create pose assets of it (Pose > Create Pose Asset), or take '
+            "poses from elsewhere",
+            name=armature.name,
         )
     poses = []
     with _posable(context, armature):
@@ -67,7 +70,9 @@ def _posable(context: bpy.types.Context, armature: bpy.types.Object) -> Iterator
     """While it lasts, no animation moves an armature; its pose comes back with all that is not keyed."""
     data = armature.animation_data
     if data is not None and data.use_tweak_mode:
-        raise UserError(f'"{armature.name}" is in tweak mode: leave it first (Tab in the Nonlinear Animation editor)')
+        raise UserError(
+            '"{name}" is in tweak mode: leave it first (Tab in the Nonlinear Animation editor)', name=armature.name
+        )
     animation = {name: getattr(data, name, None) for name in ("action", "action_slot", "use_nla")} if data else {}
     before = [(bone, _state(bone), dict(bone.items())) for bone in armature.pose.bones]
     try:

@@ -49,7 +49,10 @@ def active_character(context: bpy.types.Context, characters: Sequence[Character]
         if len(characters) == 1 or (active is not None and active in members):
             return character
     names = ", ".join(character.name for character in characters[:5])
-    raise UserError(f"{len(characters)} characters are selected ({names}): click the one whose poses are meant")
+    raise UserError(
+        "{count} characters are selected ({names}): click the one whose poses are meant",
+        count=len(characters), names=names,
+    )  # fmt: skip
 
 
 def chosen_frames(scene: bpy.types.Scene, character: Character, settings: WKSSegmentSettings) -> list[int]:
@@ -64,6 +67,7 @@ def chosen_frames(scene: bpy.types.Scene, character: Character, settings: WKSSeg
         return poses.own_frames(scene, character, settings.pose_count)
     if settings.frame_last < settings.frame_first:
         raise UserError(
-            f"The frame range ends ({settings.frame_last}) before it begins ({settings.frame_first}): swap them"
-        )
+            "The frame range ends ({last}) before it begins ({first}): swap them",
+            last=settings.frame_last, first=settings.frame_first,
+        )  # fmt: skip
     return poses.evenly(settings.frame_first, settings.frame_last, settings.pose_count)

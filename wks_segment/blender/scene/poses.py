@@ -11,9 +11,10 @@ import numpy as np
 
 from ...core import TriangleMesh
 from ...core.mesh.triangle_mesh import FloatArray, IntArray, repeats_a_vertex
+from ...core.message import Message, message_of
 from ..errors import UserError
 from .attributes import new_attribute, read_floats, read_ints
-from .characters import Character, armature_of
+from .characters import Character, armature_of, quoted
 
 ORIGIN = ".wks_segment_origin"
 """Temporary face attribute: modifiers that make new faces copy it from the face that they make them of."""
@@ -25,6 +26,11 @@ DEFORMING = frozenset({
 """Modifiers that only move vertices: behind them a face is the face that it was."""
 SAME_SURFACE = 1e-5
 """Two poses that differ by less than this fraction of the size are one and the same."""
+NO_FACES = "{names} has no faces: there is no surface to find segments on"
+NO_FACES_BUT_NODES = (
+    "{names} has no faces: there is no surface to find segments on; if it consists of instances, add a Realize "
+    "Instances node"
+)
 
 
 @dataclass(frozen=True)
@@ -128,9 +134,11 @@ def read_frames(
     before, subframe = scene.frame_current, scene.frame_subframe
     try:
         poses = []
-        for frame, name in zip(frames, names or [f"frame {frame}" for frame in frames], strict=True):
+        for frame, name in zip(
+            frames, names or [Message("frame {frame}", frame=frame) for frame in frames], strict=True
+        ):
             scene.frame_set(frame)
-            poses.append(read_pose(context, character, f"{character.name}, {name}"))
+            poses.append(read_pose(context, character, _named(character, name)))
         return with_rest(context, poses)
     finally:
         scene.frame_set(before, subframe=subframe)
@@ -169,7 +177,7 @@ def read_shape_keys(context: bpy.types.Context, character: Character, count: int
     )
     if len(names) < 2:
         raise UserError(
-            f'"{character.name}" has no shape keys that are not muted: add some, or take poses from elsewhere'
+            '"{name}" has no shape keys that are not muted: add some, or take poses from elsewhere', name=character.name
         )
     before = [(obj, obj.active_shape_key_index, obj.show_only_shape_key) for obj in keyed]
     try:
@@ -178,7 +186,7 @@ def read_shape_keys(context: bpy.types.Context, character: Character, count: int
             for obj in keyed:
                 obj.show_only_shape_key = True
                 obj.active_shape_key_index = max(obj.data.shape_keys.key_blocks.find(name), 0)
-            poses.append(read_pose(context, character, f"{character.name}, {name}"))
+            poses.append(read_pose(context, character, _named(character, name)))
         return with_rest(context, poses)
     finally:
         for obj, active, pinned in before:
@@ -221,7 +229,7 @@ def with_rest(context: bpy.types.Context, poses: list[Pose]) -> list[Pose]:
     try:
         for armature in armatures:
             armature.pose_position = "REST"
-        rest = read_pose(context, character, f"{character.name}, rest position").cut_as(poses[0])
+        rest = read_pose(context, character, Message("{name}, rest position", name=character.name)).cut_as(poses[0])
     finally:
         for armature, position in before.items():
             armature.pose_position = position
@@ -248,8 +256,11 @@ def read_pose(context: bpy.types.Context, character: Character, name: str) -> Po
             points, faces, polygon_of, vertex_of = _read_object(obj, depsgraph, origins.get(obj.data))
             bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
             if bad.size:
-                place = f'vertex {bad[0]} of "{obj.name}"'
-                raise UserError(f'"{name}": {place} has a coordinate that is not finite ({bad.size} such vertices)')
+                raise UserError(
+                    '"{pose}": vertex {vertex} of "{object}" has a coordinate that is not finite '
+                    "({count} such vertices)",
+                    pose=name, vertex=bad[0], object=obj.name, count=bad.size,
+                )  # fmt: skip
             vertices.append(points)
             triangles.append(faces + n_vertices)
             owners.append(np.where(polygon_of < 0, -1, polygon_of + polygons.start))
@@ -259,15 +270,19 @@ def read_pose(context: bpy.types.Context, character: Character, name: str) -> Po
     faces, polygon_of = np.concatenate(triangles), np.concatenate(owners)
     proper = ~repeats_a_vertex(faces)
     if not (proper.any() and (polygon_of >= 0).any()):
-        names = ", ".join(f'"{obj.name}"' for obj in character.objects)
+        names = quoted(obj.name for obj in character.objects)
         nodes = any(modifier.type == "NODES" for obj in character.objects for modifier in obj.modifiers)
-        hint = "; does it consist of instances? Then add a Realize Instances node" if nodes else ""
-        raise UserError(f"{names} has no faces: there is no surface to find parts on{hint}")
+        raise UserError(NO_FACES_BUT_NODES if nodes else NO_FACES, names=names)
     try:
         mesh = TriangleMesh(np.concatenate(vertices), faces[proper])
     except ValueError as error:
-        raise UserError(f'"{name}": {error}') from error
+        raise UserError('"{name}": {reason}', name=name, reason=message_of(error)) from error
     return Pose(name, character, mesh, polygon_of[proper], np.concatenate(own), axes)
+
+
+def _named(character: Character, name: str) -> Message:
+    """The name of a pose."""
+    return Message("{character}, {pose}", character=character.name, pose=name)
 
 
 def _axes(character: Character, depsgraph: bpy.types.Depsgraph) -> FloatArray:
@@ -300,7 +315,9 @@ def _read_object(
             origin = mesh.attributes.get(origin_name)
             if origin is None:
                 raise UserError(
-                    f'"{obj.name}": a modifier makes faces and hides of what (as Remesh): apply it, or turn it off'
+                    '"{name}": a modifier such as Remesh makes faces that cannot be traced to the mesh: apply it, or '
+                    "turn it off",
+                    name=obj.name,
                 )
             polygons = read_ints(origin.data, "value") - 1
             same &= np.array_equal(polygons, np.arange(len(obj.data.polygons)))
