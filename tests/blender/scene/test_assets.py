@@ -86,7 +86,7 @@ def test_geometry_nodes_that_leave_instances_only_are_explained():
     tree.links.new(instance.outputs[0], out.inputs[0])
     obj.modifiers.new("Nodes", "NODES").node_group = tree
     select(obj)
-    assert "does it consist of instances? Then add a Realize Instances node" in reason(OPS.learn)
+    assert "if it consists of instances, add a Realize Instances node" in reason(OPS.learn)
 
 
 def test_an_object_of_edges_only_has_no_faces():
