@@ -6,6 +6,7 @@ from functools import cache
 import bmesh
 import bpy
 import numpy as np
+import pytest
 
 from wks_segment.blender.outputs.labels import NOTE, has_labels
 
@@ -324,3 +325,11 @@ def error_of(operator, **options):
     except RuntimeError as error:
         return str(error)
     return ""
+
+
+def refuses(operator, match, **options):
+    """Assert that an operator refuses with this message, and that nothing in the file has changed."""
+    before = scene_snapshot()
+    with pytest.raises(RuntimeError, match=match):
+        operator(**options)
+    assert not changes(before, scene_snapshot())

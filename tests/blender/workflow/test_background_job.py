@@ -1,106 +1,27 @@
-"""Jobs in a thread, driven by the functions that the window's timer and events call: bpy alone has no window."""
+"""Jobs in a thread: the result, canceling, what ends a job, and errors."""
 
 import os
 import subprocess
 import sys
-import threading
-import time
 import warnings
 from pathlib import Path
 from types import SimpleNamespace
-from unittest.mock import MagicMock
 
 import bpy
-import numpy as np
 import pytest
-from builders import changes, labels_of, limbed, limbed_poses, mesh_object, scene_snapshot, select, snapshot
+from builders import changes, labels_of, limbed, mesh_object, scene_snapshot, select, snapshot
+from running_jobs import APPLY, GOING, LEARN, LONG, OPS, Ran, ended, run
 
-from wks_segment.blender.errors import ChangedError, TooLargeError, UserError
-from wks_segment.blender.operators import _report
-from wks_segment.blender.operators._base import LabelOperator
-from wks_segment.blender.operators.apply import WKS_SEGMENT_OT_apply
-from wks_segment.blender.operators.learn import WKS_SEGMENT_OT_learn
+from wks_segment.blender.errors import ChangedError, UserError
 from wks_segment.blender.ui import main_panel
-from wks_segment.blender.workflow import background_job, live_session
-from wks_segment.blender.workflow.background_job import JOB_RUNNING, BackgroundJob, TimeLeft, job_holder
+from wks_segment.blender.workflow import background_job
+from wks_segment.blender.workflow.background_job import JOB_RUNNING, job_holder
 from wks_segment.blender.workflow.segmentation_job import SegmentationJob
 from wks_segment.core import MemoryCache
 from wks_segment.core.progress import Progress
 
 pytestmark = pytest.mark.usefixtures("scene")
-OPS = bpy.ops.wks_segment
-BENDS = (0.0, 0.3, 0.6)
-LEARN, APPLY = WKS_SEGMENT_OT_learn, WKS_SEGMENT_OT_apply
-GOING = {"PASS_THROUGH"}
 STAGES = ["Starting", "Seams", "Signature", "Learning", "Labels", "Left and right", "Weights"]
-LONG = 60
-"""Seconds after which a test that hangs fails."""
-
-
-class Ran:
-    """What Blender makes of an operator's class: an operator that can be called, and keeps what it says."""
-
-    def __new__(cls, operator, **properties):
-        said = []
-        own = {name: getattr(operator, name) for name in ("bl_label", "verb", "learns", "read")}
-        report = {"report": lambda self, kinds, text: said.append((*kinds, text)), "said": said, "confirmed": False}
-        plain = {"take": lambda self, settings: None, "is_adjusted": False}
-        return type("Ran", (LabelOperator,), own | report | plain | properties)()
-
-
-@pytest.fixture
-def poses(settings):
-    """Three objects in three poses, all of what can be written asked for."""
-    settings.sides, settings.vertex_groups, settings.write_materials = "two", "soft", True
-    made = limbed_poses(*BENDS)
-    select(*made)
-    return made
-
-
-@pytest.fixture
-def at(monkeypatch):
-    """A function that holds the next job at a stage, and gives its operator and a function that lets it go on."""
-    goes_on = threading.Event()
-
-    def hold(stage, operator=LEARN, **properties):
-        reached, original = threading.Event(), BackgroundJob._report
-
-        def progress(self, now, share):
-            if now.startswith(stage) and not reached.is_set():
-                reached.set()
-                assert goes_on.wait(LONG)
-            original(self, now, share)
-
-        monkeypatch.setattr(BackgroundJob, "_report", progress)
-        ran = Ran(operator, **properties)
-        ran.begin(bpy.context)
-        assert reached.wait(LONG)
-        assert ran.step(bpy.context) == GOING
-        return ran, goes_on.set
-
-    yield hold
-    goes_on.set()
-
-
-def ended(ran):
-    """How the operator ends, once its job is over."""
-    result, begun = GOING, time.monotonic()
-    while result == GOING:
-        assert time.monotonic() - begun < LONG
-        time.sleep(0.01)
-        result = ran.step(bpy.context)
-    assert job_holder(bpy.context).job is None
-    return result
-
-
-def run(operator, **properties):
-    """An operator whose job ran to its end, and how that was."""
-    ran = Ran(operator, **properties)
-    ran.begin(bpy.context)
-    return ran, ended(ran)
-
-
-# The result
 
 
 @pytest.mark.usefixtures("learns_anew")
@@ -200,9 +121,6 @@ def test_writing_waits_until_blender_can_undo_it(poses, at):
     assert "wks_segment" in poses[0].data.attributes
 
 
-# Cancel
-
-
 @pytest.mark.usefixtures("learns_anew")
 @pytest.mark.parametrize("stage", STAGES)
 def test_escape_ends_it_at_every_stage_and_nothing_is_written(poses, at, stage):
@@ -247,9 +165,6 @@ def test_second_job_is_refused_and_the_first_goes_on(poses, at):
     go_on()
     assert ended(ran) == {"FINISHED"}
     assert OPS.learn.poll()
-
-
-# What ends it
 
 
 def deleted():
@@ -399,9 +314,6 @@ def test_blender_that_is_quit_does_not_wait():
     assert "on the way out" in done.stdout, done.stderr
 
 
-# Errors
-
-
 def test_error_in_the_thread_is_the_same_as_without_one(settings):
     select(limbed(), mesh_object([(0, 0, 0), (1, 0, 0), (1, 1e-7, 0)], [(0, 1, 2)], "Speck"))
     with pytest.raises(RuntimeError) as caught:
@@ -435,127 +347,3 @@ def test_what_others_warn_of_meanwhile_is_theirs(poses, at):
         assert ended(ran) == {"FINISHED"}
     assert [str(warning.message) for warning in said] == ["of another extension"]
     assert not any("of another extension" in text for _, text in ran.said)
-
-
-# The window
-
-
-class Window:
-    """The context of a window: Blender's, but for what needs one."""
-
-    def __init__(self):
-        self.window = object()
-        held = {
-            holder: getattr(bpy.context.window_manager, holder)
-            for holder in (background_job.JOB_HOLDER, live_session.SESSION)
-        }
-        self.window_manager = MagicMock(**held, windows=[])
-        self.window_manager.event_timer_add.return_value = None
-        self.window_manager.invoke_confirm.return_value = {"RUNNING_MODAL"}
-
-    def __getattr__(self, name):
-        return getattr(bpy.context, name)
-
-
-@pytest.fixture
-def window(monkeypatch):
-    monkeypatch.setattr(_report, "has_window", lambda context: True)
-    return Window()
-
-
-def test_button_starts_a_job_and_the_window_tells_the_time(poses, window):
-    ran = Ran(LEARN)
-    assert ran.invoke(window, None) == {"RUNNING_MODAL"}
-    window.window_manager.event_timer_add.assert_called_once_with(background_job.TIMER_INTERVAL, window=window.window)
-    window.window_manager.modal_handler_add.assert_called_once_with(ran)
-    result, begun = GOING, time.monotonic()
-    while result == GOING and time.monotonic() - begun < LONG:
-        time.sleep(0.01)
-        result = ran.modal(window, SimpleNamespace(type="TIMER", value="NOTHING"))
-    assert result == {"FINISHED"}
-    assert "wks_segment" in poses[0].data.attributes
-
-
-def test_without_a_window_the_button_does_all_at_once(poses):
-    assert bpy.app.background
-    assert OPS.learn("INVOKE_DEFAULT") == {"FINISHED"}
-    assert "wks_segment" in poses[0].data.attributes
-    assert job_holder(bpy.context).job is None
-
-
-def test_large_job_is_asked_about_and_then_runs(poses, settings, window):
-    settings.limit_memory = 1e-6
-    with pytest.raises(TooLargeError):
-        Ran(LEARN).begin(window)
-    ran = Ran(LEARN)
-    assert ran.invoke(window, "event") == {"RUNNING_MODAL"}
-    assert job_holder(bpy.context).job is None
-    ((asked, event), options) = window.window_manager.invoke_confirm.call_args
-    assert (asked, event) == (ran, "event")
-    assert "allowed are 5.0 minutes and 0.0 GB" in options["message"]
-    window.window_manager.modal_handler_add.assert_not_called()
-    assert ran.execute(window) == {"RUNNING_MODAL"}
-    window.window_manager.modal_handler_add.assert_called_once_with(ran)
-    assert ended(ran) == {"FINISHED"}
-    # From the panel that adjusts the last operation, it is a script's again.
-    assert ran.execute(bpy.context) == {"FINISHED"}
-
-
-def test_refusal_in_the_window_is_told(settings, window):
-    settings.source = "SHAPE_KEYS"
-    select(limbed())
-    ran = Ran(LEARN)
-    assert ran.invoke(window, None) == {"CANCELLED"}
-    assert ran.said[0][0] == "ERROR"
-    assert '"Limbed" has no shape keys' in ran.said[0][1]
-    window.window_manager.modal_handler_add.assert_not_called()
-
-
-# What is shown
-
-
-def drawn():
-    """The layout that the main panel was drawn on."""
-    layout = MagicMock()
-    cls = main_panel.WKS_SEGMENT_PT_main
-    cls.draw(type("Shown", (cls.__bases__[0],), {"layout": layout})(), bpy.context)
-    return layout.column.return_value
-
-
-def test_panel_shows_how_far_it_is_and_why_it_ended(poses, at):
-    assert not drawn().row.return_value.progress.called
-    ran, go_on = at("Signature")
-    job = job_holder(bpy.context).job
-    job.stage, job.share = 'Signature of "Fox, frame 12" (3 of 5)', 0.375
-    column = drawn()
-    lines = [call.kwargs["text"] for call in column.label.call_args_list]
-    assert " ".join(lines) == "Signature of Fox, frame 12 · 3\N{NO-BREAK SPACE}of\N{NO-BREAK SPACE}5"
-    column.row.return_value.progress.assert_called_once_with(factor=0.375, text="38 %")
-    assert column.row.return_value.operator.call_args.args == ("wks_segment.cancel",)
-    OPS.cancel()
-    go_on()
-    ended(ran)
-    column = drawn()
-    lines = [call.kwargs["text"] for call in column.label.call_args_list]
-    assert " ".join(lines) == "Learn and Segment was canceled, nothing is written"
-    assert not column.row.return_value.progress.called
-
-
-@pytest.mark.parametrize(
-    ("told", "text"),
-    [
-        ([], ""),
-        ([(1.0, 0.5)], ""),
-        ([(10.0, 0.01)], ""),
-        ([(10.0, 0.25)], "about 30 s left"),
-        ([(30.0, 0.9)], "a few seconds left"),
-        ([(60.0, 0.1)], "about 9 min left"),
-        ([(10.0, 0.25), (10.1, 0.5)], "about 30 s left"),
-        ([(10.0, 0.25)] + [(t, 0.5) for t in np.arange(10.1, 20, 0.1)], "about 15 s left"),
-    ],
-)
-def test_time_left(told, text):
-    left = TimeLeft()
-    for seconds, share in told:
-        left.update(seconds, share)
-    assert left.text == text

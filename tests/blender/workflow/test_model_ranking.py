@@ -45,7 +45,7 @@ def test_models_are_ranked(two):
     assert OPS.rank() == {"FINISHED"}
     assert [item.name for item in two.ranking] == ["Limbed", "Box"]
     assert two.ranking[0].probability > 0.95
-    assert two.verdict == "Unseen: Limbed fits, surely"
+    assert two.verdict == "Unseen: Limbed fits, with certainty"
     assert two.models[two.used_model].name == "Box", "only the ranking has changed"
 
 
@@ -82,10 +82,10 @@ def test_what_is_gone_is_said(two):
     with pytest.raises(RuntimeError, match="The ranking has only 2 models"):
         OPS.apply_ranked(index=2)
     two.models[0].name = "Renamed"
-    with pytest.raises(RuntimeError, match='no model named "Limbed" any more: rank anew'):
+    with pytest.raises(RuntimeError, match='The model "Limbed" is gone: rank the models again'):
         OPS.apply_ranked(index=0)
     bpy.data.objects.remove(bpy.data.objects["Unseen"])
-    with pytest.raises(RuntimeError, match="What was ranked is gone: rank anew"):
+    with pytest.raises(RuntimeError, match="The ranked objects are gone: rank the models again"):
         OPS.apply_ranked(index=1)
     assert two.models[two.used_model].name == "Box"
 
@@ -133,7 +133,7 @@ def test_panel_shows_the_ranking(two):
     layout = MagicMock()
     models_panel.draw_ranking(layout, two)
     column = layout.column.return_value
-    assert column.label.call_args_list[0].kwargs["text"] == "Unseen: Limbed fits, surely"
+    assert column.label.call_args_list[0].kwargs["text"] == "Unseen: Limbed fits, with certainty"
     row = column.row.return_value
     assert [call.kwargs["text"] for call in row.label.call_args_list] == ["Limbed", "Box"]
     assert [call.kwargs["text"] for call in row.operator.call_args_list] == ["Use", "Use"]
@@ -173,7 +173,7 @@ def test_rank_a_file(command, folder, tmp_path):
     (warning,) = done.result["warnings"]
     assert "broken.json" in warning
     text = command("rank", path, "--models", folder).out
-    assert "Limbed fits, surely" in text
+    assert "Limbed fits, with certainty" in text
     assert text.index("Limbed") < text.index("Box")
 
 

@@ -1,0 +1,137 @@
+"""Jobs started from a window: the question about a large job, and what the panel shows."""
+
+import time
+from types import SimpleNamespace
+from unittest.mock import MagicMock
+
+import bpy
+import numpy as np
+import pytest
+from builders import limbed, select
+from running_jobs import GOING, LEARN, LONG, OPS, Ran, ended
+
+from wks_segment.blender.errors import TooLargeError
+from wks_segment.blender.operators import _report
+from wks_segment.blender.ui import main_panel
+from wks_segment.blender.workflow import background_job, live_session
+from wks_segment.blender.workflow.background_job import TimeLeft, job_holder
+
+pytestmark = pytest.mark.usefixtures("scene")
+
+
+class Window:
+    """The context of a window: Blender's, but for what needs one."""
+
+    def __init__(self):
+        self.window = object()
+        held = {
+            holder: getattr(bpy.context.window_manager, holder)
+            for holder in (background_job.JOB_HOLDER, live_session.SESSION)
+        }
+        self.window_manager = MagicMock(**held, windows=[])
+        self.window_manager.event_timer_add.return_value = None
+        self.window_manager.invoke_confirm.return_value = {"RUNNING_MODAL"}
+
+    def __getattr__(self, name):
+        return getattr(bpy.context, name)
+
+
+@pytest.fixture
+def window(monkeypatch):
+    monkeypatch.setattr(_report, "has_window", lambda context: True)
+    return Window()
+
+
+def test_button_starts_a_job_and_the_window_tells_the_time(poses, window):
+    ran = Ran(LEARN)
+    assert ran.invoke(window, None) == {"RUNNING_MODAL"}
+    window.window_manager.event_timer_add.assert_called_once_with(background_job.TIMER_INTERVAL, window=window.window)
+    window.window_manager.modal_handler_add.assert_called_once_with(ran)
+    result, begun = GOING, time.monotonic()
+    while result == GOING and time.monotonic() - begun < LONG:
+        time.sleep(0.01)
+        result = ran.modal(window, SimpleNamespace(type="TIMER", value="NOTHING"))
+    assert result == {"FINISHED"}
+    assert "wks_segment" in poses[0].data.attributes
+
+
+def test_without_a_window_the_button_does_all_at_once(poses):
+    assert bpy.app.background
+    assert OPS.learn("INVOKE_DEFAULT") == {"FINISHED"}
+    assert "wks_segment" in poses[0].data.attributes
+    assert job_holder(bpy.context).job is None
+
+
+def test_large_job_is_asked_about_and_then_runs(poses, settings, window):
+    settings.limit_memory = 1e-6
+    with pytest.raises(TooLargeError):
+        Ran(LEARN).begin(window)
+    ran = Ran(LEARN)
+    assert ran.invoke(window, "event") == {"RUNNING_MODAL"}
+    assert job_holder(bpy.context).job is None
+    ((asked, event), options) = window.window_manager.invoke_confirm.call_args
+    assert (asked, event) == (ran, "event")
+    assert "allowed are 5.0 minutes and 0.0 GB" in options["message"]
+    window.window_manager.modal_handler_add.assert_not_called()
+    assert ran.execute(window) == {"RUNNING_MODAL"}
+    window.window_manager.modal_handler_add.assert_called_once_with(ran)
+    assert ended(ran) == {"FINISHED"}
+    # From the panel that adjusts the last operation, it is a script's again.
+    assert ran.execute(bpy.context) == {"FINISHED"}
+
+
+def test_refusal_in_the_window_is_told(settings, window):
+    settings.source = "SHAPE_KEYS"
+    select(limbed())
+    ran = Ran(LEARN)
+    assert ran.invoke(window, None) == {"CANCELLED"}
+    assert ran.said[0][0] == "ERROR"
+    assert '"Limbed" has no shape keys' in ran.said[0][1]
+    window.window_manager.modal_handler_add.assert_not_called()
+
+
+def drawn():
+    """The layout that the main panel was drawn on."""
+    layout = MagicMock()
+    cls = main_panel.WKS_SEGMENT_PT_main
+    cls.draw(type("Shown", (cls.__bases__[0],), {"layout": layout})(), bpy.context)
+    return layout.column.return_value
+
+
+def test_panel_shows_how_far_it_is_and_why_it_ended(poses, at):
+    assert not drawn().row.return_value.progress.called
+    ran, go_on = at("Signature")
+    job = job_holder(bpy.context).job
+    job.stage, job.share = 'Signature of "Fox, frame 12" (3 of 5)', 0.375
+    column = drawn()
+    lines = [call.kwargs["text"] for call in column.label.call_args_list]
+    assert " ".join(lines) == "Signature of Fox, frame 12 · 3\N{NO-BREAK SPACE}of\N{NO-BREAK SPACE}5"
+    column.row.return_value.progress.assert_called_once_with(factor=0.375, text="38 %")
+    assert column.row.return_value.operator.call_args.args == ("wks_segment.cancel",)
+    OPS.cancel()
+    go_on()
+    ended(ran)
+    column = drawn()
+    lines = [call.kwargs["text"] for call in column.label.call_args_list]
+    assert " ".join(lines) == "Learn and Segment was canceled, nothing is written"
+    assert not column.row.return_value.progress.called
+
+
+@pytest.mark.parametrize(
+    ("told", "text"),
+    [
+        ([], ""),
+        ([(1.0, 0.5)], ""),
+        ([(10.0, 0.01)], ""),
+        ([(10.0, 0.25)], "about 30 s left"),
+        ([(30.0, 0.9)], "a few seconds left"),
+        ([(60.0, 0.1)], "about 9 min left"),
+        ([(10.0, 0.25), (10.1, 0.5)], "about 30 s left"),
+        ([(10.0, 0.25)] + [(t, 0.5) for t in np.arange(10.1, 20, 0.1)], "about 15 s left"),
+    ],
+)
+def test_time_left(told, text):
+    left = TimeLeft()
+    for seconds, share in told:
+        left.update(seconds, share)
+    assert left.text == text
