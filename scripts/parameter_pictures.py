@@ -23,7 +23,7 @@ from PIL import Image
 
 import wks_segment.blender
 from wks_segment.blender.cli import demo_scene
-from wks_segment.blender.outputs.labels import FACES
+from wks_segment.blender.outputs.part_attributes import FACE_ATTRIBUTE
 from wks_segment.blender.render.contact_sheet import Tile, render_poses
 from wks_segment.blender.scene import poses
 from wks_segment.blender.scene.characters import Character
@@ -166,7 +166,7 @@ def labeled(character: Character, changes: dict[str, Any], known: tuple[Any, dic
     found = []
     for obj in character.objects:
         labels = np.empty(len(obj.data.polygons), dtype=np.int32)
-        obj.data.attributes[FACES].data.foreach_get("value", labels)
+        obj.data.attributes[FACE_ATTRIBUTE].data.foreach_get("value", labels)
         found.append(labels.astype(np.int64))
     return np.concatenate(found)
 

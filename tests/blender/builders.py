@@ -8,7 +8,8 @@ import bpy
 import numpy as np
 import pytest
 
-from wks_segment.blender.outputs.labels import NOTE, has_labels
+from wks_segment.blender.outputs.ledger import LEDGER
+from wks_segment.blender.outputs.part_attributes import has_labels
 
 LIMBS = np.array([[1.0, 0.0, 0.2], [-0.5, 0.8, 0.1], [-0.4, -0.7, -0.5]])
 """Directions of the three limbs of the test character."""
@@ -310,7 +311,7 @@ class Outcome:
 
 def read_labels(mesh):
     """(p,) components that were written to the polygons of a mesh, found by the note on it; None if there are none."""
-    name = mesh[NOTE].get("faces", "") if has_labels(mesh) else ""
+    name = mesh[LEDGER].get("faces", "") if has_labels(mesh) else ""
     if name not in mesh.attributes:
         return None
     labels = np.empty(len(mesh.polygons), dtype=np.int32)

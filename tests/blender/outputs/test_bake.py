@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from builders import changes, limbed, mesh_object, numbers, scene_snapshot, select
 
-from wks_segment.blender.outputs.labels import clear_labels, labels_on, write_labels
+from wks_segment.blender.outputs.labels import clear_labels, write_labels
+from wks_segment.blender.outputs.part_attributes import labels_on
 from wks_segment.blender.parts.part_style import Style
 
 pytestmark = pytest.mark.usefixtures("scene")
@@ -266,7 +267,7 @@ def test_no_segments_no_bake(settings):
 def test_cycles_that_is_turned_off_is_named(labeled, monkeypatch):
     from wks_segment.blender.outputs import bake
 
-    monkeypatch.setattr(bake, "ENGINE", "NO_SUCH_ENGINE")
+    monkeypatch.setattr(bake, "BAKE_ENGINE", "NO_SUCH_ENGINE")
     with pytest.raises(RuntimeError, match="Cycles is turned off"):
         OPS.bake()
     assert [scene.name for scene in bpy.data.scenes] == ["Scene"]

@@ -6,6 +6,7 @@ import pytest
 from builders import changes, coordinates, limbed, mesh_object, numbers, read_labels, snapshot
 
 from wks_segment.blender.outputs.labels import clear_labels, write_labels
+from wks_segment.blender.outputs.options import OutputOptions
 from wks_segment.blender.parts.palette import palette
 
 pytestmark = pytest.mark.usefixtures("scene")
@@ -92,14 +93,14 @@ def test_colors_are_shown_and_what_is_rendered_stays(painted):
 
 
 def test_without_colors_the_active_color_stays(painted):
-    write_labels(painted, stripes(painted), colors=False)
+    write_labels(painted, stripes(painted), OutputOptions(colors=False))
     assert "wks_segment_color" not in painted.attributes
     assert painted.color_attributes.active_color.name == "Tint"
 
 
 def test_materials_come_behind_those_of_the_artist(painted):
     labels = stripes(painted)
-    write_labels(painted, labels, materials=True)
+    write_labels(painted, labels, OutputOptions(materials=True))
     assert [m and m.name for m in painted.materials[:3]] == ["Skin", "Cloth", None]
     assert len(painted.materials) == 3 + 5
     for polygon, label in zip(painted.polygons, labels, strict=True):
@@ -112,14 +113,14 @@ def test_materials_come_behind_those_of_the_artist(painted):
 
 
 def test_only_components_that_occur_get_a_material(mesh):
-    write_labels(mesh, np.where(np.arange(len(mesh.polygons)) < 5, 2, 7), materials=True)
+    write_labels(mesh, np.where(np.arange(len(mesh.polygons)) < 5, 2, 7), OutputOptions(materials=True))
     assert [material.name for material in mesh.materials] == ["Segment 3", "Segment 8"]
 
 
 def test_meshes_share_the_material_of_a_component(mesh):
     other = limbed("Other").data
-    write_labels(mesh, stripes(mesh), materials=True)
-    write_labels(other, stripes(other), materials=True)
+    write_labels(mesh, stripes(mesh), OutputOptions(materials=True))
+    write_labels(other, stripes(other), OutputOptions(materials=True))
     assert list(mesh.materials) == list(other.materials)
     clear_labels(mesh)
     assert len(other.materials) == 5
@@ -143,7 +144,7 @@ def kept(before, after):
 @pytest.mark.parametrize("materials", [False, True])
 def test_data_of_the_artist_are_kept(painted, materials):
     before = snapshot(painted)
-    write_labels(painted, stripes(painted), materials=materials)
+    write_labels(painted, stripes(painted), OutputOptions(materials=materials))
     kept(before, snapshot(painted))
     if not materials:
         assert snapshot(painted)["material index"] == before["material index"]
@@ -163,10 +164,10 @@ def test_attribute_of_the_artist_with_our_name_survives(mesh, name, kind, domain
     mesh.attributes.new(name, kind, domain)
     before = snapshot(mesh)
     labels = stripes(mesh)
-    write_labels(mesh, labels, materials=True)
+    write_labels(mesh, labels, OutputOptions(materials=True))
     kept(before, snapshot(mesh))
     np.testing.assert_array_equal(read_labels(mesh), labels)
-    write_labels(mesh, labels, materials=True)
+    write_labels(mesh, labels, OutputOptions(materials=True))
     kept(before, snapshot(mesh))
     clear_labels(mesh)
     assert not changes(before, snapshot(mesh))
@@ -179,7 +180,7 @@ def test_vertex_groups_of_the_artist_with_our_names_survive(mesh):
         obj.vertex_groups.new(name=name).add([1, 2], 0.5, "REPLACE")
     before, labels = snapshot(mesh), stripes(mesh)
     for _ in range(2):
-        write_labels(mesh, labels, materials=True)
+        write_labels(mesh, labels, OutputOptions(materials=True))
         np.testing.assert_array_equal(read_labels(mesh), labels)
         assert obj.vertex_groups.keys() == names
         assert {f"{name}.001" for name in names} < set(mesh.attributes.keys())
@@ -200,11 +201,11 @@ def test_property_of_the_artist_with_our_name_survives(mesh):
 
 
 def test_second_write_replaces_the_first(painted):
-    write_labels(painted, stripes(painted, 7), materials=True)
-    write_labels(painted, stripes(painted, 3), materials=True)
+    write_labels(painted, stripes(painted, 7), OutputOptions(materials=True))
+    write_labels(painted, stripes(painted, 3), OutputOptions(materials=True))
     twice = snapshot(painted)
     clear_labels(painted)
-    write_labels(painted, stripes(painted, 3), materials=True)
+    write_labels(painted, stripes(painted, 3), OutputOptions(materials=True))
     assert not changes(twice, snapshot(painted))
     assert len(painted.materials) == 3 + 3
     assert not [name for name in twice["attributes"] if name.endswith(".001")]
@@ -212,8 +213,8 @@ def test_second_write_replaces_the_first(painted):
 
 def test_second_write_without_colors_and_materials_removes_those_of_the_first(painted):
     before = snapshot(painted)
-    write_labels(painted, stripes(painted), materials=True)
-    write_labels(painted, stripes(painted), colors=False)
+    write_labels(painted, stripes(painted), OutputOptions(materials=True))
+    write_labels(painted, stripes(painted), OutputOptions(colors=False))
     after = snapshot(painted)
     assert set(after["attributes"]) - set(before["attributes"]) == {"wks_segment", "wks_segment_vertex"}
     assert after["slots"] == before["slots"]
@@ -229,7 +230,7 @@ def test_second_write_without_colors_and_materials_removes_those_of_the_first(pa
 def test_clear_gives_back_exactly_what_was(request, who, colors, materials):
     mesh = request.getfixturevalue(who)
     before, materials_before = snapshot(mesh), bpy.data.materials[:]
-    write_labels(mesh, stripes(mesh), colors=colors, materials=materials)
+    write_labels(mesh, stripes(mesh), OutputOptions(colors=colors, materials=materials))
     assert changes(before, snapshot(mesh))
     assert clear_labels(mesh)
     assert not changes(before, snapshot(mesh))
@@ -239,7 +240,7 @@ def test_clear_gives_back_exactly_what_was(request, who, colors, materials):
 def test_clear_after_several_writes_gives_back_exactly_what_was(painted):
     before = snapshot(painted)
     for count, materials in ((5, True), (3, False), (4, True)):
-        write_labels(painted, stripes(painted, count), materials=materials)
+        write_labels(painted, stripes(painted, count), OutputOptions(materials=materials))
     clear_labels(painted)
     assert not changes(before, snapshot(painted))
 
@@ -252,7 +253,7 @@ def test_clear_without_labels_does_nothing(painted):
 
 
 def test_clear_leaves_what_the_artist_added_in_between(painted):
-    write_labels(painted, stripes(painted), materials=True)
+    write_labels(painted, stripes(painted), OutputOptions(materials=True))
     painted.materials.append(bpy.data.materials.new("Fur"))
     painted.attributes.new("late", "FLOAT", "FACE")
     clear_labels(painted)
@@ -261,7 +262,7 @@ def test_clear_leaves_what_the_artist_added_in_between(painted):
 
 
 def test_clear_works_after_the_artist_removed_some_of_it(painted):
-    write_labels(painted, stripes(painted), materials=True)
+    write_labels(painted, stripes(painted), OutputOptions(materials=True))
     for name in ("wks_segment", "wks_segment_color"):
         painted.attributes.remove(painted.attributes[name])
     assert read_labels(painted) is None
@@ -272,7 +273,7 @@ def test_clear_works_after_the_artist_removed_some_of_it(painted):
 
 def test_a_copy_of_a_labeled_mesh_is_cleared_by_itself(painted):
     before = snapshot(painted)
-    write_labels(painted, stripes(painted), materials=True)
+    write_labels(painted, stripes(painted), OutputOptions(materials=True))
     labeled, copy = snapshot(painted), painted.copy()
     clear_labels(copy)
     assert not changes(before, snapshot(copy))
@@ -284,7 +285,7 @@ def test_materials_that_hang_on_the_object_stay_there(mesh):
     mesh.materials.append(bpy.data.materials.new("On the mesh"))
     obj.material_slots[0].link = "OBJECT"
     obj.material_slots[0].material = bpy.data.materials.new("On the object")
-    write_labels(mesh, stripes(mesh), materials=True)
+    write_labels(mesh, stripes(mesh), OutputOptions(materials=True))
     assert len(obj.material_slots) == 6
     clear_labels(mesh)
     assert [(slot.link, slot.material.name) for slot in obj.material_slots] == [("OBJECT", "On the object")]

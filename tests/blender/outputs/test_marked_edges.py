@@ -7,6 +7,7 @@ from builders import labels_of, limbed, limbed_surface, mesh_object, select
 
 from wks_segment.blender.outputs.labels import write_labels
 from wks_segment.blender.outputs.marked_edges import marked_pairs
+from wks_segment.blender.outputs.options import OutputOptions
 from wks_segment.blender.scene.characters import Character
 from wks_segment.core import PoseSegmentation
 
@@ -95,7 +96,7 @@ def test_all_polygons_at_an_edge_of_three_are_neighbors():
 
 
 def test_materials_of_segments_are_no_mark(marked):
-    write_labels(marked.data, np.array([0, 1, 1, 1]), materials=True)
+    write_labels(marked.data, np.array([0, 1, 1, 1]), OutputOptions(materials=True))
     assert pairs(marked, kinds={"materials"}) == {(2, 3)}
 
 

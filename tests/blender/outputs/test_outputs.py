@@ -16,8 +16,10 @@ from builders import (
     select,
 )
 
-from wks_segment.blender.outputs.labels import clear_labels, labels_on, write_labels
-from wks_segment.blender.outputs.materials import COMPONENT
+from wks_segment.blender.outputs.labels import clear_labels, write_labels
+from wks_segment.blender.outputs.materials import PART_PROPERTY
+from wks_segment.blender.outputs.options import OutputOptions
+from wks_segment.blender.outputs.part_attributes import labels_on
 from wks_segment.blender.parts.part_style import Style
 from wks_segment.blender.scene.topology import border_edges
 
@@ -145,7 +147,7 @@ def test_new_labels_take_back_what_is_not_asked_for_any_more(obj, settings):
 
 def test_each_segment_is_a_face_set(obj):
     labels = stripes(obj.data) + 1000 * (np.arange(len(obj.data.polygons)) % 3)
-    write_labels(obj.data, labels, face_sets=True)
+    write_labels(obj.data, labels, OutputOptions(face_sets=True))
     sets = numbers(obj.data, FACE_SETS)
     assert sets.min() > 0
     assert len(np.unique(sets)) == len(np.unique(np.stack([sets, labels]), axis=1).T) == len(np.unique(labels))
@@ -153,7 +155,7 @@ def test_each_segment_is_a_face_set(obj):
 
 def test_face_sets_that_were_drawn_since_stay(obj):
     own = numbers(obj.data, FACE_SETS) if FACE_SETS in obj.data.attributes else np.ones(len(obj.data.polygons))
-    write_labels(obj.data, stripes(obj.data), face_sets=True)
+    write_labels(obj.data, stripes(obj.data), OutputOptions(face_sets=True))
     obj.data.attributes[FACE_SETS].data[3].value = 500
     clear_labels(obj.data)
     own[3] = 500
@@ -166,7 +168,7 @@ def test_face_sets_that_were_drawn_since_stay(obj):
 def test_seams_are_where_the_segment_changes_and_where_they_were(obj):
     before = seams_of(obj.data)
     labels = stripes(obj.data)
-    write_labels(obj.data, labels, seams=True)
+    write_labels(obj.data, labels, OutputOptions(seams=True))
     around = {}
     for polygon in obj.data.polygons:
         for key in polygon.edge_keys:
@@ -177,7 +179,7 @@ def test_seams_are_where_the_segment_changes_and_where_they_were(obj):
 
 def test_seams_that_were_marked_since_stay(obj):
     before = seams_of(obj.data)
-    write_labels(obj.data, stripes(obj.data), seams=True)
+    write_labels(obj.data, stripes(obj.data), OutputOptions(seams=True))
     late = int(np.flatnonzero(~seams_of(obj.data))[0])
     obj.data.edges[late].use_seam = True
     clear_labels(obj.data)
@@ -221,13 +223,13 @@ def test_materials_are_colored_copies_of_the_template(obj, settings, template):
     before = {"materials": sorted(material.name for material in bpy.data.materials), "rgb": rgb_of(template)}
     settings.write_materials, settings.material_template = True, template
     OPS.learn()
-    ours = [material for material in obj.data.materials if COMPONENT in material]
+    ours = [material for material in obj.data.materials if PART_PROPERTY in material]
     assert len(ours) == len(np.unique(labels_of(obj)))
     for material in ours:
         assert material.node_tree.nodes["Principled BSDF"].inputs["Roughness"].default_value == pytest.approx(0.9)
         linear = np.array(rgb_of(material))
         srgb = np.where(linear < 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-        np.testing.assert_allclose(srgb, Style().colors_of(np.array(material[COMPONENT])), atol=1e-3)
+        np.testing.assert_allclose(srgb, Style().colors_of(np.array(material[PART_PROPERTY])), atol=1e-3)
     assert rgb_of(template) == before["rgb"]
     OPS.clear()
     assert sorted(material.name for material in bpy.data.materials) == before["materials"]
@@ -337,7 +339,7 @@ def test_unwrapping_changes_nothing_else(labeled):
 
 def test_corrected_face_sets_become_segments(obj):
     labels = stripes(obj.data)
-    write_labels(obj.data, labels, face_sets=True)
+    write_labels(obj.data, labels, OutputOptions(face_sets=True))
     sets = obj.data.attributes[FACE_SETS].data
     sets[0].value, sets[1].value, sets[2].value = sets[len(sets) - 1].value, 90, 95
     expected = labels.copy()
@@ -349,7 +351,7 @@ def test_corrected_face_sets_become_segments(obj):
 def test_corrected_materials_become_segments(obj, settings):
     labels = stripes(obj.data)
     settings.write_materials = True
-    write_labels(obj.data, labels, materials=True)
+    write_labels(obj.data, labels, OutputOptions(materials=True))
     first = len(obj.data.materials) - 4
     obj.data.materials.append(bpy.data.materials.new("Fur"))
     obj.data.polygons[0].material_index = first + labels[-1]
@@ -434,7 +436,7 @@ def test_pieces_look_as_the_whole_and_move_with_it(settings, make):
     painted(obj)
     obj.location = (1, 2, 3)
     body = obj.parent or obj
-    write_labels(obj.data, stripes(obj.data), materials=True)
+    write_labels(obj.data, stripes(obj.data), OutputOptions(materials=True))
     select(obj)
     assert OPS.separate() == {"FINISHED"}
     pieces = pieces_of(obj)

@@ -18,7 +18,7 @@ from builders import (
 )
 
 from wks_segment.blender.outputs.labels import clear_labels, write_labels
-from wks_segment.blender.outputs.vertex_weights import LEAST, own_vertices, soft_weights
+from wks_segment.blender.outputs.vertex_weights import LEAST_WEIGHT, own_vertices, soft_weights
 from wks_segment.blender.scene import poses as reader
 from wks_segment.blender.scene.characters import Character
 from wks_segment.blender.scene.mesh_arrays import Body
@@ -26,6 +26,7 @@ from wks_segment.blender.workflow import pipeline
 from wks_segment.blender.workflow.pipeline import Run
 from wks_segment.blender.workflow.report import Report
 from wks_segment.core import PoseSegmentation, TriangleMesh
+from wks_segment.core.progress import Progress
 
 pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
@@ -116,7 +117,7 @@ def test_soft_weights_of_a_vertex_sum_to_one(settings):
     for obj in poses:
         weights = weights_of(obj)
         np.testing.assert_allclose(weights.sum(axis=1), 1, atol=1e-6)
-        assert weights[weights > 0].min() >= LEAST - 1e-6
+        assert weights[weights > 0].min() >= LEAST_WEIGHT - 1e-6
         assert ((weights > 0.1) & (weights < 0.9)).any(), "all weights are hard"
         columns = [int(name.split()[-1]) - 1 for name in ours(obj)]
         largest = np.array(columns)[weights.argmax(axis=1)]
@@ -137,7 +138,7 @@ def test_soft_weights_are_the_mean_over_the_poses(settings, rigged):
     components = [int(name.split()[-1]) - 1 for name in ours(rigged)]
 
     def cut(posteriors):
-        kept = np.where(posteriors < LEAST, 0, posteriors)
+        kept = np.where(posteriors < LEAST_WEIGHT, 0, posteriors)
         return (kept / kept.sum(axis=1, keepdims=True))[:, components]
 
     got = weights_of(rigged)
@@ -159,7 +160,7 @@ def test_smoothness_reaches_the_soft_weights(settings):
             (signature,) = pipeline.describe(model, [pose], Run(Report([])))
             plain = model.predict_proba(signature)
             np.testing.assert_allclose(weights[plain >= 0.99], plain[plain >= 0.99], atol=0.011)
-            np.testing.assert_array_equal(weights > 0, plain >= LEAST)
+            np.testing.assert_array_equal(weights > 0, plain >= LEAST_WEIGHT)
     assert steps[0] > 1.1 * steps[1] > 1.1 * 1.1 * steps[2]
 
 
@@ -289,8 +290,8 @@ def test_the_way_over_polygons_comes_close_to_that_over_vertices():
     model, pose = fitted(limbed())
     described = [model.describe(pose.mesh)]
     body = Body.of(pose.character)
-    exact = soft_weights(model, [pose], described, body)
-    over_polygons = soft_weights(model, [replace(pose, vertex_of=np.full(642, -1))], described, body)
+    exact = soft_weights(model, [pose], described, body, Progress())
+    over_polygons = soft_weights(model, [replace(pose, vertex_of=np.full(642, -1))], described, body, Progress())
     assert np.abs(exact - over_polygons).max() > 1e-3, "it is the same way"
     assert np.abs(exact - over_polygons).mean() < 0.05
     assert (exact.argmax(axis=1) == over_polygons.argmax(axis=1)).mean() > 0.95

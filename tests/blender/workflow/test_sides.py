@@ -9,6 +9,7 @@ from mathutils import Matrix
 from wks_segment.blender.cli import creature as builder
 from wks_segment.blender.cli import demo_scene
 from wks_segment.blender.outputs.labels import clear_labels, write_labels
+from wks_segment.blender.outputs.options import OutputOptions
 from wks_segment.blender.parts import part_ids
 from wks_segment.blender.parts.palette import sided_palette
 from wks_segment.blender.scene.characters import Character
@@ -225,7 +226,7 @@ def test_materials_of_a_segment_stand_together_and_meshes_share_them():
     labels = np.resize([2001, 1, 0, 1001, 7], len(meshes[0].polygons))
     before = snapshot(meshes[0])
     for mesh in meshes:
-        write_labels(mesh, labels, materials=True)
+        write_labels(mesh, labels, OutputOptions(materials=True))
     names = ["Segment 1", "Segment 2", "Segment 2.L", "Segment 2.R", "Segment 8"]
     assert [material.name for material in meshes[0].materials] == names
     assert list(meshes[0].materials) == list(meshes[1].materials)

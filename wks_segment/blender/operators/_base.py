@@ -229,6 +229,6 @@ class LabelOperator(JobOperator[SegmentationJob]):
     def written(self, context: bpy.types.Context) -> set[str]:
         """Write the labels and report them."""
         session_of(context).write(self.computed)
-        if self.computed.request.colors:
+        if self.computed.request.outputs.colors:
             _report.show_colors(context)
         return _report.finish(self, self.verb, self.computed.report)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import bpy
 
 from ...core.message import Message
-from ..outputs.labels import has_labels
+from ..outputs.part_attributes import has_labels
 from ..scene.characters import selected_meshes, why_no_mesh
 from ..workflow import segment_list
 from ..workflow.background_job import JOB_RUNNING, job_holder

@@ -20,6 +20,6 @@ class WKS_SEGMENT_OT_accept(BaseOperator, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         job = session_of(context).update(context.scene)
-        if job.request.colors:
+        if job.request.outputs.colors:
             _report.show_colors(context)
         return _report.finish(self, "Accepted", job.report)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ...core.message import Message
-from ..outputs.bake import bake_id_maps
+from ..outputs.bake import BakeOptions, bake_id_maps
 from ..scene.characters import group, selected_meshes
 from . import _needs, _report
 from ._base import BaseOperator
@@ -22,14 +22,13 @@ class WKS_SEGMENT_OT_bake(BaseOperator, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
-        size, margin, unwrap = settings.bake_size, settings.bake_margin, settings.bake_unwrap
+        size = settings.bake_size
+        options = BakeOptions(size, settings.bake_margin, settings.bake_unwrap, settings.style())
         images: list[str] = []
         warnings: list[str] = []
         with _report.cursor_progress(context) as progress:
-            for character in group(selected_meshes(context)):
-                baked = bake_id_maps(
-                    context, character, settings.style(), size, margin, unwrap, warnings, progress.report
-                )
+            for character, step in progress.each(group(selected_meshes(context))):
+                baked = bake_id_maps(context, character, options, warnings, step)
                 images += [f'"{id_map.image.name}"' for id_map in baked]
         _report.tell(
             self, {"INFO"},

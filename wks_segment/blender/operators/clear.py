@@ -5,8 +5,9 @@ from __future__ import annotations
 import bpy
 
 from ...core.message import Message
-from ..outputs.labels import clear_labels, has_labels
-from ..outputs.separate import unite, whole_of
+from ..outputs.labels import clear_labels
+from ..outputs.part_attributes import has_labels
+from ..outputs.separate import original_of, unite
 from ..scene.characters import selected_meshes
 from ..workflow import segment_list
 from . import _needs, _report
@@ -25,10 +26,10 @@ class WKS_SEGMENT_OT_clear(BaseOperator, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> set[str]:
         selected = selected_meshes(context)
         names = {obj.name for obj in selected}
-        wholes = {whole for obj in selected if (whole := whole_of(obj)) is not None}
-        n_kept = sum(unite(context, whole) for whole in wholes)
+        originals = {original for obj in selected if (original := original_of(obj)) is not None}
+        n_kept = sum(unite(context, original) for original in originals)
         # Separated objects are removed by now, unless the user has changed them.
-        remaining = wholes | {obj for obj in context.scene.objects if obj.name in names}
+        remaining = originals | {obj for obj in context.scene.objects if obj.name in names}
         meshes = {obj.data for obj in remaining if obj.data.library is None}
         n_cleared = sum(clear_labels(mesh) for mesh in meshes)
         context.scene.wks_segment.applied = ""

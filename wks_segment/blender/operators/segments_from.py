@@ -7,9 +7,9 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ...core.message import Message
-from ..outputs.import_labels import GROUP, SOURCES, corrected_labels, corrected_parts, corrected_weights
-from ..outputs.labels import has_labels
+from ..outputs.import_labels import LABEL_SOURCES, VERTEX_GROUPS, corrected_labels, corrected_parts, corrected_weights
 from ..outputs.overrides import keep_by_hand
+from ..outputs.part_attributes import has_labels
 from ..scene.characters import group, selected_meshes
 from ..workflow import pipeline
 from ..workflow.pipeline import LabelRequest
@@ -27,7 +27,7 @@ class WKS_SEGMENT_OT_segments_from(BaseOperator, bpy.types.Operator):
 
     needs = (_needs.no_job, _needs.object_mode, _needs.selected_mesh)
 
-    source: EnumProperty(name="From", description="Where the segments are", items=SOURCES)
+    source: EnumProperty(name="From", description="Where the segments are", items=LABEL_SOURCES)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
@@ -37,7 +37,7 @@ class WKS_SEGMENT_OT_segments_from(BaseOperator, bpy.types.Operator):
             parts = corrected_parts(character, self.source)
             labels[character] = corrected_labels(character, self.source, parts)
             weights[character] = corrected_weights(character, parts)
-        soft = weights if self.source == GROUP and settings.vertex_groups == "soft" else None
+        soft = weights if self.source == VERTEX_GROUPS and settings.vertex_groups == "soft" else None
         # The imported segments replace those that were assigned by hand before.
         for mesh in (obj.data for character in labels for obj in character.objects):
             if has_labels(mesh):

@@ -7,7 +7,7 @@ import bpy
 from bpy.props import BoolProperty
 
 from ...core.message import Message
-from ..outputs.ledger import note_of
+from ..outputs.ledger import Ledger
 from ..workflow import segment_list
 from . import _needs, _report
 from ._base import BaseOperator
@@ -55,7 +55,7 @@ class WKS_SEGMENT_OT_select_segment(BaseOperator, bpy.types.Operator):
 def _select(mesh: bpy.types.Mesh, part: int) -> int:
     """Select the visible faces of a part in Edit Mode; return how many."""
     edit = bmesh.from_edit_mesh(mesh)
-    labels = edit.faces.layers.int.get(note_of(mesh).get("faces", ""))
+    labels = edit.faces.layers.int.get(Ledger(mesh).get("faces", ""))
     faces = [] if labels is None else [face for face in edit.faces if face[labels] == part and not face.hide]
     for face in faces:
         face.select_set(True)

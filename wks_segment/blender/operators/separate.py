@@ -6,8 +6,8 @@ import bpy
 
 from ...core.message import Message
 from ..errors import UserError
-from ..outputs.labels import labels_on
-from ..outputs.separate import separate, whole_of
+from ..outputs.part_attributes import labels_on
+from ..outputs.separate import original_of, separate
 from ..scene.characters import group, selected_meshes
 from . import _needs, _report
 from ._base import BaseOperator
@@ -27,7 +27,7 @@ class WKS_SEGMENT_OT_separate(BaseOperator, bpy.types.Operator):
         separated = []
         for character in group(selected_meshes(context)):
             for obj in character.objects:
-                if whole_of(obj) is not None:
+                if original_of(obj) is not None:
                     raise UserError('"{object}" is separated already: Clear it first', object=obj.name)
                 labels = labels_on(obj.data)
                 if labels is not None:

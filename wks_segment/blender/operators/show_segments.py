@@ -8,7 +8,7 @@ from bpy.props import IntProperty
 
 from ...core.mesh.triangle_mesh import BoolArray, IntArray
 from ...core.message import Message
-from ..outputs.labels import labels_on
+from ..outputs.part_attributes import labels_on
 from ..scene.attributes import read_bools, read_ints, write_bools
 from ..scene.topology import at_corners
 from ..workflow import segment_list

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core.message import Message
 from ..errors import UserError
-from ..outputs.connected_regions import pieces_of
+from ..outputs.connected_regions import regions_of
 from ..outputs.overrides import by_hand, keep_by_hand
 from ..parts import part_ids
 from ..parts.palette import MAX_COLORS
@@ -34,8 +34,8 @@ class WKS_SEGMENT_OT_split_segment(BaseOperator, bpy.types.Operator):
         if part is None:
             return {"CANCELLED"}
         name = settings.style().name_of(part)
-        regions_of = pieces_of(group(objects), part, settings.min_share / 100)
-        count = 1 + max((int(regions.max(initial=-1)) for regions in regions_of.values()), default=-1)
+        regions_by_character = regions_of(group(objects), part, settings.min_share / 100)
+        count = 1 + max((int(regions.max(initial=-1)) for regions in regions_by_character.values()), default=-1)
         if count > MAX_COLORS:
             raise UserError(
                 "{segment} has {count} connected regions, too many for a list: raise Smallest Part",
@@ -49,7 +49,7 @@ class WKS_SEGMENT_OT_split_segment(BaseOperator, bpy.types.Operator):
         base, side = part_ids.without_side(name), part // part_ids.SIDE_STEP
         # The first region keeps the part's own number.
         part_of_region = np.array([-1, *(segment_list.make_part(settings, base, side) for _ in range(count - 1))])
-        for character, regions in regions_of.items():
+        for character, regions in regions_by_character.items():
             for obj, polygons in polygon_ranges(character):
                 new_parts = part_of_region[np.maximum(regions[polygons], 0)]
                 keep_by_hand(obj.data, np.where(new_parts < 0, by_hand(obj.data), new_parts))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 
 from ...core.message import Message
-from ..outputs.labels import labels_on
-from ..outputs.transfer import transferred
+from ..outputs.part_attributes import labels_on
+from ..outputs.transfer import transfer_labels
 from ..scene import poses as reader
 from ..scene.characters import group, mesh_objects
 from ..scene.mesh_arrays import Body
@@ -51,7 +51,7 @@ class WKS_SEGMENT_OT_transfer(BaseOperator, bpy.types.Operator):
             if obj.data is not active.data:
                 (character,) = group([obj])
                 (target,) = reader.read_objects(context, [character])
-                labels[character] = pipeline.filled(transferred(source, target), Body.of(character))
+                labels[character] = pipeline.filled(transfer_labels(source, target), Body.of(character))
         pipeline.write_outputs(settings, labels, LabelRequest.of(settings, labels), report)
         if settings.write_colors:
             _report.show_colors(context)

@@ -6,8 +6,9 @@ import bpy
 from bpy.props import EnumProperty
 
 from ...core.message import Message
-from ..outputs.labels import labels_on
-from ..outputs.uv_maps import METHODS, check_room, unwrap_parts, write_uv_map
+from ..outputs.part_attributes import labels_on
+from ..outputs.unwrapping import UNWRAP_METHODS, unwrap_parts
+from ..outputs.uv_maps import check_room_for_uv_map, write_uv_map
 from ..scene.characters import group, selected_meshes
 from . import _needs, _report
 from ._base import BaseOperator
@@ -23,14 +24,14 @@ class WKS_SEGMENT_OT_unwrap(BaseOperator, bpy.types.Operator):
     needs = (_needs.no_job, _needs.object_mode, _needs.labeled_mesh)
 
     method: EnumProperty(
-        name="Method", description="Where islands are cut in addition to the borders of segments", items=METHODS
+        name="Method", description="Where islands are cut in addition to the borders of segments", items=UNWRAP_METHODS
     )
 
     def run(self, context: bpy.types.Context) -> set[str]:
         objects = [obj for character in group(selected_meshes(context)) for obj in character.objects]
         meshes = {obj.data: labels for obj in objects if (labels := labels_on(obj.data)) is not None}
         for mesh in meshes:
-            check_room(mesh)
+            check_room_for_uv_map(mesh)
         for mesh, labels in meshes.items():
             write_uv_map(mesh, unwrap_parts(context, mesh, labels, self.method))
         if len(meshes) == 1:

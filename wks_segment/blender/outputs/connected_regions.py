@@ -1,4 +1,4 @@
-"""The connected pieces of a part, which splitting makes parts of their own."""
+"""The regions of a part (its connected components on a character), which Split makes parts of their own."""
 
 from __future__ import annotations
 
@@ -14,79 +14,87 @@ from ..scene.characters import Character
 from ..scene.mesh_arrays import Body
 from ..scene.poses import polygon_ranges
 from ..scene.topology import neighbors
-from .labels import labels_on
+from .part_attributes import labels_on
 
 
-def pieces_of(characters: Sequence[Character], part: int, least_share: float) -> dict[Character, IntArray]:
-    """For each polygon of each character the piece of a part that it is in, −1 if it is not of that part.
+def regions_of(characters: Sequence[Character], part: int, least_share: float) -> dict[Character, IntArray]:
+    """(p,) region of a part that each polygon of each character is in, −1 outside of the part.
 
-    Pieces are numbered alike on all characters, the largest of the first 0. One below a share of a character's area
-    belongs to the nearest larger one.
+    Regions have the same numbers on all characters; the largest one of the first character is 0. A region below
+    `least_share` of the character's area belongs to the nearest larger one.
     """
-    found: dict[Character, IntArray] = {}
+    result: dict[Character, IntArray] = {}
     for character in characters:
-        mine = _pieces(character, part, least_share)
-        for other, known in found.items():
-            mine = _numbered_as(character, mine, other, known)
-            break
-        found[character] = mine
-    return found
-
-
-def _pieces(character: Character, part: int, least_share: float) -> IntArray:
-    pairs, labels, areas = [], [], []
-    for obj, polygons in polygon_ranges(character):
-        on_mesh = labels_on(obj.data)
-        labels.append(np.full(polygons.stop - polygons.start, -1) if on_mesh is None else on_mesh)
-        pairs.append(polygons.start + neighbors(obj.data))
-        areas.append(read_floats(obj.data.polygons, "area"))
-    label, area = np.concatenate(labels), np.concatenate(areas).astype(np.float64)
-    pair = np.concatenate(pairs)
-    inside = pair[(label[pair] == part).all(axis=1)]
-    count = len(label)
-    polygons_in = np.flatnonzero(label == part)
-    result = np.full(count, -1)
-    if not len(polygons_in):
-        return result
-    _, component = np.unique(components_of_pairs(inside, count)[polygons_in], return_inverse=True)
-    size = np.bincount(component.ravel(), weights=area[polygons_in])
-    order = np.argsort(-size, kind="stable")
-    large = order[(size[order] >= least_share * area.sum()) | (np.arange(len(order)) == 0)]
-    number = np.full(len(size), -1)
-    number[large] = np.arange(len(large))
-    piece = number[component.ravel()]
-    if (piece < 0).any():
-        center = Body.of(character).polygons[polygons_in]
-        piece[piece < 0] = piece[piece >= 0][cKDTree(center[piece >= 0]).query(center[piece < 0])[1]]
-    result[polygons_in] = piece
+        regions = _regions(character, part, least_share)
+        if result:
+            first, known = next(iter(result.items()))
+            regions = _numbered_like(character, regions, first, known)
+        result[character] = regions
     return result
 
 
-def _numbered_as(character: Character, pieces: IntArray, other: Character, known: IntArray) -> IntArray:
-    """Pieces with the numbers of those of another character which they correspond to; others get new ones.
+def _regions(character: Character, part: int, least_share: float) -> IntArray:
+    """(p,) region of each polygon of one character, from the largest region; −1 outside of the part."""
+    labels, areas, pairs = _polygons_of(character)
+    count = len(labels)
+    polygons = np.flatnonzero(labels == part)
+    result = np.full(count, -1)
+    if not len(polygons):
+        return result
+    inside = pairs[(labels[pairs] == part).all(axis=1)]
+    _, component = np.unique(components_of_pairs(inside, count)[polygons], return_inverse=True)
+    component = component.ravel()
+    area = np.bincount(component, weights=areas[polygons])
+    order = np.argsort(-area, kind="stable")
+    large = order[(area[order] >= least_share * areas.sum()) | (np.arange(len(order)) == 0)]
+    number = np.full(len(area), -1)
+    number[large] = np.arange(len(large))
+    regions = number[component]
+    if (regions < 0).any():
+        centers = Body.of(character).polygons[polygons]
+        nearest = cKDTree(centers[regions >= 0]).query(centers[regions < 0])[1]
+        regions[regions < 0] = regions[regions >= 0][nearest]
+    result[polygons] = regions
+    return result
 
-    Where the polygons are the same, by the polygons in common; elsewhere by where they are in the whole.
+
+def _polygons_of(character: Character) -> tuple[IntArray, FloatArray, IntArray]:
+    """(p,) part and (p,) area of each polygon of a character, and (q, 2) neighbors."""
+    labels, areas, pairs = [], [], []
+    for obj, polygons in polygon_ranges(character):
+        on_mesh = labels_on(obj.data)
+        labels.append(np.full(polygons.stop - polygons.start, -1) if on_mesh is None else on_mesh)
+        areas.append(read_floats(obj.data.polygons, "area"))
+        pairs.append(polygons.start + neighbors(obj.data))
+    return np.concatenate(labels), np.concatenate(areas).astype(np.float64), np.concatenate(pairs)
+
+
+def _numbered_like(character: Character, regions: IntArray, other: Character, known: IntArray) -> IntArray:
+    """Regions with the numbers of the corresponding regions of another character; the remaining ones get new numbers.
+
+    Regions correspond by the polygons that they have in common if the characters have the same number of polygons, else
+    by their place within the character.
     """
-    count, n_known = int(pieces.max(initial=-1)) + 1, int(known.max(initial=-1)) + 1
+    count, n_known = int(regions.max(initial=-1)) + 1, int(known.max(initial=-1)) + 1
     if not count or not n_known:
-        return pieces
-    if len(pieces) == len(known):
+        return regions
+    if len(regions) == len(known):
         cost = np.zeros((count, n_known))
-        both = (pieces >= 0) & (known >= 0)
-        np.add.at(cost, (pieces[both], known[both]), -1.0)
+        both = (regions >= 0) & (known >= 0)
+        np.add.at(cost, (regions[both], known[both]), -1.0)
     else:
-        here, there = _middles(character, pieces, count), _middles(other, known, n_known)
-        cost = np.linalg.norm(here[:, None] - there, axis=2)
+        places, known_places = _places(character, regions, count), _places(other, known, n_known)
+        cost = np.linalg.norm(places[:, None] - known_places, axis=2)
     number = np.full(count, -1)
     rows, columns = linear_sum_assignment(cost)
     number[rows] = columns
     number[number < 0] = n_known + np.arange((number < 0).sum())
-    return np.where(pieces < 0, -1, number[pieces])
+    return np.where(regions < 0, -1, number[regions])
 
 
-def _middles(character: Character, pieces: IntArray, count: int) -> FloatArray:
-    """(count, 3) where the middle of each piece is, from 0 to 1 along each side of the character's box."""
-    places_of = Body.of(character).polygons
-    extent = np.ptp(places_of, axis=0)
-    unit = (places_of - places_of.min(axis=0)) / np.where(extent > 0, extent, 1)
-    return np.array([unit[pieces == piece].mean(axis=0) for piece in range(count)])
+def _places(character: Character, regions: IntArray, count: int) -> FloatArray:
+    """(count, 3) center of each region, from 0 to 1 along each axis of the character's bounding box."""
+    centers = Body.of(character).polygons
+    extent = np.ptp(centers, axis=0)
+    unit = (centers - centers.min(axis=0)) / np.where(extent > 0, extent, 1)
+    return np.array([unit[regions == region].mean(axis=0) for region in range(count)])

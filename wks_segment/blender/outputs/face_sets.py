@@ -1,45 +1,52 @@
-"""Writes parts as face sets, which sculpt mode shows, and gives those of the artist back."""
+"""Parts as face sets, which Sculpt Mode shows."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import bpy
 import numpy as np
 
-from ...core.mesh.triangle_mesh import IntArray
 from ..parts import part_ids
 from ..scene.attributes import read_attribute, write_attribute
-from .ledger import NOTE, add_attribute
+from .ledger import Ledger
+from .output import PartsOfMesh
 
-FACE_SETS = ".sculpt_face_set"
+FACE_SET_ATTRIBUTE = ".sculpt_face_set"
 """Blender's own face attribute: the number of the face set, from 1."""
 OWN_FACE_SETS = "wks_segment_own_face_set"
-"""Face attribute that keeps the face set of each face from before ours."""
-FIRST = 1
-"""Face set of part 0."""
+"""Face attribute that keeps the face set that each face had before ours."""
+FIRST_FACE_SET = 1
+"""Face set of part 0; Blender counts face sets from 1."""
 
 
-def write_face_sets(mesh: bpy.types.Mesh, labels: IntArray) -> None:
-    """Put each polygon into the face set of its part, given the (p,) parts."""
-    own = read_attribute(mesh, FACE_SETS)
-    if own is None:
-        mesh.attributes.new(FACE_SETS, "INT", "FACE")
-    else:
-        add_attribute(mesh, "own_face_sets", OWN_FACE_SETS, "INT", "FACE", own)
-    mesh[NOTE]["face_sets"] = [part + FIRST for part in part_ids.unique_parts(labels)]
-    write_attribute(mesh.attributes[FACE_SETS], labels + FIRST)
+class FaceSets:
+    """A face set for each part, in place of the artist's own face sets."""
+
+    def write(self, mesh: bpy.types.Mesh, parts: PartsOfMesh, ledger: Ledger) -> None:
+        """Put each polygon into the face set of its part, if the options ask for face sets."""
+        if not parts.options.face_sets:
+            return
+        own = read_attribute(mesh, FACE_SET_ATTRIBUTE)
+        if own is None:
+            mesh.attributes.new(FACE_SET_ATTRIBUTE, "INT", "FACE")
+        else:
+            ledger.add_attribute("own_face_sets", OWN_FACE_SETS, "INT", "FACE", own)
+        ledger["face_sets"] = [part + FIRST_FACE_SET for part in part_ids.unique_parts(parts.labels)]
+        write_attribute(mesh.attributes[FACE_SET_ATTRIBUTE], parts.labels + FIRST_FACE_SET)
+
+    def take_back(self, mesh: bpy.types.Mesh, ledger: Ledger) -> None:
+        """Give faces that are still in a face set of ours their own back; sets that the artist drew since stay."""
+        _restore(mesh, ledger)
+        ledger.remove_attribute("own_face_sets")
 
 
-def remove_face_sets(mesh: bpy.types.Mesh, note: dict[str, Any]) -> None:
-    """Give faces that still are in a face set of ours their own back; sets that the artist drew since stay."""
-    now = read_attribute(mesh, FACE_SETS)
-    if "face_sets" not in note or now is None:
+def _restore(mesh: bpy.types.Mesh, ledger: Ledger) -> None:
+    now = read_attribute(mesh, FACE_SET_ATTRIBUTE)
+    if "face_sets" not in ledger or now is None:
         return
-    ours = np.isin(now, list(note["face_sets"]))
-    own = read_attribute(mesh, note.get("own_face_sets", ""))
-    if own is None and ours.all():
-        mesh.attributes.remove(mesh.attributes[FACE_SETS])
+    is_ours = np.isin(now, list(ledger["face_sets"]))
+    own = read_attribute(mesh, ledger.get("own_face_sets", ""))
+    if own is None and is_ours.all():
+        mesh.attributes.remove(mesh.attributes[FACE_SET_ATTRIBUTE])
         return
-    now[ours] = FIRST if own is None else own[ours]
-    write_attribute(mesh.attributes[FACE_SETS], now)
+    now[is_ours] = FIRST_FACE_SET if own is None else own[is_ours]
+    write_attribute(mesh.attributes[FACE_SET_ATTRIBUTE], now)

@@ -1,41 +1,78 @@
-"""The note on a mesh: what of it is ours, so that Clear removes just that."""
+"""The ledger of a mesh: a custom property that lists what we wrote to it, so that Clear takes exactly that back."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import bpy
-import numpy as np
 from numpy.typing import NDArray
 
 from ..scene.attributes import write_attribute
-from .vertex_groups import free_name
+from ..scene.vertex_group_access import free_name
 
-NOTE = "wks_segment_note"
-"""Custom property of a mesh: which attributes, vertex groups and slots are ours, and what was active before."""
-
-
-def note_of(mesh: bpy.types.Mesh) -> dict[str, Any]:
-    """What is noted on a mesh, to read; empty if there is nothing of ours."""
-    return mesh[NOTE].to_dict() if has_note(mesh) else {}
+LEDGER = "wks_segment_note"
+"""Name of the custom property. It and its keys never change, since files of older versions must be cleared as well."""
 
 
-def has_note(mesh: bpy.types.Mesh) -> bool:
-    """Whether a mesh carries a note of ours, rather than none or somebody else's property."""
-    return NOTE in mesh and hasattr(mesh[NOTE], "to_dict")
+class Ledger:
+    """What we wrote to a mesh: names of attributes and vertex groups, ranges of slots, and what was active before.
+
+    Entries are kept on the mesh at once, so that Clear also mends a mesh when writing broke off in between.
+    """
+
+    def __init__(self, mesh: bpy.types.Mesh) -> None:
+        self._mesh = mesh
+        self._entries: dict[str, Any] = mesh[LEDGER].to_dict() if has_ledger(mesh) else {}
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._entries
+
+    def __getitem__(self, key: str) -> Any:
+        return self._entries[key]
+
+    def __setitem__(self, key: str, value: Any) -> None:
+        if not has_ledger(self._mesh):
+            self._mesh[LEDGER] = {}
+        self._mesh[LEDGER][key] = value
+        self._entries[key] = value
+
+    def get(self, key: str, default: Any) -> Any:
+        """The entry, or the default if there is none."""
+        return self._entries.get(key, default)
+
+    def remove(self, key: str) -> None:
+        """Remove an entry, if it is there."""
+        if key in self._entries:
+            del self._entries[key], self._mesh[LEDGER][key]
+
+    def begin(self, kept: Iterable[str]) -> None:
+        """Begin anew with only these entries of before."""
+        self._mesh[LEDGER] = {key: self._entries[key] for key in kept if key in self}
+        self._entries = self._mesh[LEDGER].to_dict()
+
+    def delete(self) -> None:
+        """Remove the ledger from the mesh."""
+        del self._mesh[LEDGER]
+        self._entries = {}
+
+    def add_attribute(self, key: str, name: str, data_type: str, domain: str, values: NDArray[Any]) -> None:
+        """Add an attribute with these values to the mesh and enter its name: a name that is taken gets a number."""
+        attribute = self._mesh.attributes.new(free_name(self._mesh, name), data_type, domain)
+        self[key] = attribute.name
+        write_attribute(attribute, values)
+
+    def attribute(self, key: str) -> bpy.types.Attribute | None:
+        """The attribute of ours whose name is entered under a key, if it is still there."""
+        return self._mesh.attributes.get(self.get(key, ""))
+
+    def remove_attribute(self, key: str) -> None:
+        """Remove the attribute whose name is entered under a key, if it is still there."""
+        attribute = self.attribute(key)
+        if attribute is not None:
+            self._mesh.attributes.remove(attribute)
 
 
-def open_note(mesh: bpy.types.Mesh) -> Any:
-    """The note on a mesh, to write to; a new one if there is none."""
-    if not has_note(mesh):
-        mesh[NOTE] = {}
-    return mesh[NOTE]
-
-
-def add_attribute(
-    mesh: bpy.types.Mesh, key: str, name: str, kind: str, domain: str, values: NDArray[np.generic]
-) -> None:  # fmt: skip
-    """Add an attribute and note the name that it got: a name that is taken gets a number."""
-    attribute = mesh.attributes.new(free_name(mesh, name), kind, domain)
-    mesh[NOTE][key] = attribute.name  # before the values are written, so that Clear finds it whatever happens
-    write_attribute(attribute, values)
+def has_ledger(mesh: bpy.types.Mesh) -> bool:
+    """Whether a mesh carries a ledger of ours, rather than none or somebody else's property of that name."""
+    return LEDGER in mesh and hasattr(mesh[LEDGER], "to_dict")

@@ -16,7 +16,7 @@ from ...core.mesh.triangle_mesh import IntArray
 from ...core.message import message_of
 from ...core.progress import Progress
 from ..errors import ChangedError, UserError
-from ..outputs.overrides import merged
+from ..outputs.overrides import merge_parts
 from ..parts.part_style import Style
 from ..props.preferences import preference
 from ..props.settings import WKSSegmentSettings
@@ -174,7 +174,7 @@ class Session:
             job = self._recomputed(scene)
             self.proposed, self.message = (self._state(scene), job), ""
             notes = scene.wks_segment.notes()
-            shown = {character: merged(labels, notes.joined) for character, labels in job.labels.items()}
+            shown = {character: merge_parts(labels, notes.joined) for character, labels in job.labels.items()}
             self.preview.show(context, shown, scene.wks_segment.style())
 
     def discard(self, scene: bpy.types.Scene) -> None:

@@ -11,7 +11,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
-import bpy
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -30,11 +29,11 @@ from ...core.progress import Progress
 from ...core.segmentation import DESCRIBED
 from ...core.spectral.memory import available_memory
 from ..errors import TooLargeError, UserError
+from ..outputs.labels import write_labels
 from ..outputs.marked_edges import marked_pairs
-from ..outputs.overrides import write_edited
-from ..outputs.vertex_weights import by_parts, soft_weights
+from ..outputs.options import OutputOptions
+from ..outputs.vertex_weights import soft_weights, weights_of_parts
 from ..parts import part_ids
-from ..parts.part_style import Style
 from ..props.settings import WKSSegmentSettings
 from ..scene import poses as reader
 from ..scene.characters import Character
@@ -83,25 +82,15 @@ class LabelRequest:
     min_share : float
         Smallest region, as a share of the area.
     sides : "one" or "two"
-    vertex_groups : "none", "hard" or "soft"
-    colors, materials, face_sets, seams : bool
-        Whether they are written.
-    template : str
-        Name of the material that materials of parts are copied from; empty for none.
-    style : Style
+    outputs : OutputOptions
+        What is written with the labels.
     bodies
         The whole mesh of each character that is labeled.
     """
 
     min_share: float
     sides: str
-    vertex_groups: str
-    colors: bool
-    materials: bool
-    face_sets: bool
-    seams: bool
-    template: str
-    style: Style
+    outputs: OutputOptions
     bodies: dict[Character, Body]
 
     @classmethod
@@ -110,13 +99,15 @@ class LabelRequest:
         return cls(
             settings.min_share / 100,
             settings.sides,
-            settings.vertex_groups,
-            settings.write_colors,
-            settings.write_materials,
-            settings.write_face_sets,
-            settings.write_seams,
-            settings.material_template.name if settings.material_template is not None else "",
-            settings.style(),
+            OutputOptions(
+                colors=settings.write_colors,
+                materials=settings.write_materials,
+                template=settings.material_template.name if settings.material_template is not None else "",
+                vertex_groups=settings.vertex_groups,
+                face_sets=settings.write_face_sets,
+                seams=settings.write_seams,
+                style=settings.style(),
+            ),
             {
                 character: Body.of(character, marked_pairs(character, settings.snap_to))
                 for character in dict.fromkeys(characters)
@@ -298,7 +289,7 @@ def soften(
 
     None if the request is not for soft vertex groups.
     """
-    if request.vertex_groups != "soft":
+    if request.outputs.vertex_groups != "soft":
         return None
     weights: dict[Character, dict[int, FloatArray]] = {}
     with run.report.stage("label"):
@@ -309,7 +300,7 @@ def soften(
             stage = Message('Weights of "{character}"', character=character.name)
             progress = run.progress.part(i / len(groups), (i + 1) / len(groups), stage)
             of_segments = soft_weights(model, [poses[j] for j in group], [described[j] for j in group], body, progress)
-            of_parts = by_parts(of_segments, labels[character], body)
+            of_parts = weights_of_parts(of_segments, labels[character], body)
             weights |= {poses[j].character: of_parts for j in group}
     return weights
 
@@ -329,12 +320,12 @@ def write_outputs(
     If a new model may number parts differently from the labels on the objects (`renumbered`), the user's names, colors
     and faces by hand are carried over first.
     """
-    if weights is None and request.vertex_groups == "soft":
+    if weights is None and request.outputs.vertex_groups == "soft":
         report.warn("The vertex groups are hard: only a model gives the probabilities of soft ones (Apply to Selected)")
     if renumbered:
         segment_list.carry_over(settings, labels)
     notes, style, written = settings.notes(), settings.style(), [np.zeros(0, dtype=np.int64)]
-    template = bpy.data.materials.get(request.template)
+    options = replace(request.outputs, style=style)
     with report.stage("write"):
         for character, parts in labels.items():
             ranges = zip(reader.polygon_ranges(character), reader.vertex_ranges(character), strict=True)
@@ -342,11 +333,7 @@ def write_outputs(
                 if polygons.stop == polygons.start:
                     continue
                 own = None if weights is None else {part: w[vertices] for part, w in weights[character].items()}
-                final = write_edited(
-                    obj.data, parts[polygons], style, notes.joined, request.colors, request.materials, own,
-                    request.vertex_groups != "none" and weights is None, request.face_sets, request.seams, template,
-                )  # fmt: skip
-                written.append(final)
+                written.append(write_labels(obj.data, parts[polygons], options, notes.joined, own))
         segment_list.fill(settings)
     report.parts = {style.name_of(part): part for part in part_ids.unique_parts(np.concatenate(written))}
 

@@ -12,19 +12,18 @@ import numpy as np
 from ...core import PartNotes
 from ...core.mesh.triangle_mesh import IntArray
 from ...core.user_labels import LONGEST_NAME
-from ..outputs.labels import has_labels, labels_on
-from ..outputs.ledger import NOTE, note_of
-from ..outputs.materials import COMPONENT, recolor_material
-from ..outputs.overrides import by_hand, keep_by_hand, model_labels, rewrite
+from ..outputs.color_attribute import recolor_faces
+from ..outputs.labels import rewrite_labels
+from ..outputs.materials import PART_PROPERTY, recolor_material
+from ..outputs.overrides import by_hand, keep_by_hand, model_labels
+from ..outputs.part_attributes import has_labels, labels_on
 from ..outputs.vertex_groups import rename_group
 from ..parts import part_ids
 from ..parts.palette import most_different
-from ..parts.part_style import Style
 from ..props.settings import WKSSegmentSettings
-from ..scene.attributes import read_bools, read_floats, write_attribute
+from ..scene.attributes import read_bools, read_floats
 from ..scene.characters import Character, mesh_objects, with_rigged
 from ..scene.poses import polygon_ranges
-from ..scene.topology import at_corners
 
 SUCCESSOR_OVERLAP = 0.5
 """Common area of an old and a new part, as a share of what they cover together, above which the new part is the old
@@ -97,7 +96,7 @@ def rewrite_all(settings: WKSSegmentSettings, objects: list[bpy.types.Object] | 
     """Write the labels of objects (None: of all in the scene) again with the user's current edits, and list them."""
     notes = settings.notes()
     for mesh in meshes_of(labeled(settings, everywhere=True) if objects is None else objects):
-        rewrite(mesh, settings.style(), notes.joined)
+        rewrite_labels(mesh, settings.style(), notes.joined)
     fill(settings)
 
 
@@ -136,12 +135,12 @@ def restyle(settings: WKSSegmentSettings, part: int, name: bool = True, color: b
     style = settings.style()
     meshes = meshes_of(labeled(settings, everywhere=True))
     for mesh in meshes if name else ():
-        rename_group(mesh, mesh[NOTE], part, style)
+        rename_group(mesh, part, style)
     with leaving_edit_mode(bpy.context) if color else nullcontext():
         for mesh in meshes if color else ():
-            _recolor_faces(mesh, part, style)
+            recolor_faces(mesh, part, style)
     for material in bpy.data.materials:
-        if material.get(COMPONENT) == part and material.library is None:
+        if material.get(PART_PROPERTY) == part and material.library is None:
             if name:
                 material.name = style.name_of(part)
             if color:
@@ -235,15 +234,3 @@ def _suffixed(base: str, part: int, number: str = "") -> str:
     suffix = part_ids.SIDE_SUFFIXES[part // part_ids.SIDE_STEP]
     base = part_ids.without_side(base) if suffix else base
     return base[: LONGEST_NAME - len(number) - len(suffix)].rstrip() + number + suffix
-
-
-def _recolor_faces(mesh: bpy.types.Mesh, part: int, style: Style) -> None:
-    """Write the color of a part to the corners of its faces, if the mesh has our color attribute."""
-    labels, colors = labels_on(mesh), mesh.color_attributes.get(note_of(mesh).get("colors", ""))
-    if labels is None or colors is None:
-        return
-    corners = at_corners(mesh, labels == part)
-    painted = read_floats(colors.data, "color_srgb", 4)
-    painted[corners, :3] = style.colors_of(np.array([part]))
-    write_attribute(colors, painted)
-    mesh.update()

@@ -11,9 +11,9 @@ import numpy as np
 
 from ....core.progress import Progress
 from ...errors import UserError
-from ...outputs.bake import bake_id_maps
-from ...outputs.id_map import save
-from ...outputs.labels import labels_on
+from ...outputs.bake import BakeOptions, bake_id_maps
+from ...outputs.id_map import save_image
+from ...outputs.part_attributes import labels_on
 from ...scene import file_formats
 from ...workflow import model_library, pipeline
 from ...workflow.pipeline import LabelRequest, Run
@@ -67,19 +67,23 @@ def _bake(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
         report.laplacians = ["none"] * len(poses)
         report.add_labels(np.concatenate([of_object for of_object in there if of_object is not None]))
     written: dict[str, Path] = {}
+    bake_options = BakeOptions(settings.bake_size, settings.bake_margin, options.unwrap, settings.style())
     with report.stage("bake"):
         id_maps = [
             id_map
-            for character in characters
+            for i, character in enumerate(characters)
             for id_map in bake_id_maps(
-                bpy.context, character, settings.style(), settings.bake_size, settings.bake_margin, options.unwrap,
-                report.warnings, progress.report,
+                bpy.context,
+                character,
+                bake_options,
+                report.warnings,
+                progress.part(i / len(characters), (i + 1) / len(characters)),
             )
-        ]  # fmt: skip
+        ]
         for id_map in id_maps:
             of = "" if len(id_maps) == 1 else f"_{bpy.path.clean_name(id_map.objects[0].name)}"
             written[id_map.image.name] = options.output.with_stem(options.output.stem + of)
-            save(id_map.image, written[id_map.image.name])
+            save_image(id_map.image, written[id_map.image.name])
     if options.blend:
         file_formats.save_scene(options.blend)
         written["blend"] = options.blend

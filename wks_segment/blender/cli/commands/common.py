@@ -12,7 +12,7 @@ import bpy
 from ....core import DiskCache, PartNotes, PoseSegmentation
 from ....core.progress import Progress
 from ...errors import UserError
-from ...outputs.overrides import merged
+from ...outputs.overrides import merge_parts
 from ...parts import part_ids
 from ...props.settings import WKSSegmentSettings
 from ...render.contact_sheet import Tile, render_poses
@@ -162,7 +162,7 @@ def label(
     if options.render:
         with report.stage("render"):
             joined = settings.notes().joined
-            tiles = [Tile(pose, merged(labels[pose.character], joined), pose.name) for pose in poses]
+            tiles = [Tile(pose, merge_parts(labels[pose.character], joined), pose.name) for pose in poses]
             render_poses(tiles, options.render, style=settings.style())
 
 

@@ -1,0 +1,47 @@
+"""The numbers of parts as integer attributes of faces and vertices."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...core.mesh.triangle_mesh import IntArray
+from ..scene.attributes import read_face_ints, read_ints
+from ..scene.topology import at_corners
+from .ledger import Ledger, has_ledger
+from .output import PartsOfMesh
+
+FACE_ATTRIBUTE = "wks_segment"
+VERTEX_ATTRIBUTE = "wks_segment_vertex"
+
+
+class PartAttributes:
+    """Two attributes: the part of each face, and the part of most faces around each vertex."""
+
+    def write(self, mesh: bpy.types.Mesh, parts: PartsOfMesh, ledger: Ledger) -> None:
+        """Add both attributes."""
+        ledger.add_attribute("faces", FACE_ATTRIBUTE, "INT", "FACE", parts.labels)
+        ledger.add_attribute("vertices", VERTEX_ATTRIBUTE, "INT", "POINT", _labels_of_vertices(mesh, parts.labels))
+
+    def take_back(self, mesh: bpy.types.Mesh, ledger: Ledger) -> None:
+        """Remove both attributes."""
+        ledger.remove_attribute("faces")
+        ledger.remove_attribute("vertices")
+
+
+def has_labels(mesh: bpy.types.Mesh) -> bool:
+    """Whether a mesh carries anything that we wrote."""
+    return has_ledger(mesh)
+
+
+def labels_on(mesh: bpy.types.Mesh) -> IntArray | None:
+    """(p,) parts of a mesh's polygons as they were written; None if there are none."""
+    return read_face_ints(mesh, Ledger(mesh).get("faces", ""))
+
+
+def _labels_of_vertices(mesh: bpy.types.Mesh, labels: IntArray) -> IntArray:
+    """(n,) label that most of the faces around each vertex have; 0 at a vertex without a face."""
+    distinct, column = np.unique(labels, return_inverse=True)
+    count = np.zeros((len(mesh.vertices), len(distinct)), dtype=np.int32)
+    np.add.at(count, (read_ints(mesh.loops, "vertex_index"), at_corners(mesh, column.ravel())), 1)
+    return np.where(count.any(axis=1), distinct[count.argmax(axis=1)], 0)
