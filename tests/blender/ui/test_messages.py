@@ -13,7 +13,7 @@ from wks_segment.blender.ui import messages
 from wks_segment.blender.ui.german.interface import GERMAN_OPERATORS
 from wks_segment.blender.ui.german.messages import GERMAN_MESSAGES
 from wks_segment.blender.ui.german.names import GERMAN_NAMES
-from wks_segment.blender.ui.segments_panel import PRESETS
+from wks_segment.blender.ui.segments_panel import NAME_PRESETS
 from wks_segment.blender.ui.translations import MESSAGE, NAME, TRANSLATIONS
 from wks_segment.core.message import Message
 
@@ -128,7 +128,7 @@ def test_blender_is_asked_for_all_of_them():
 
 
 def test_names_to_choose_from_have_a_german_one():
-    assert GERMAN_NAMES.keys() == {*PRESETS, *(name for names in PRESETS.values() for name in names)}
+    assert GERMAN_NAMES.keys() == {*NAME_PRESETS, *(name for names in NAME_PRESETS.values() for name in names)}
     assert {(NAME, name) for name in GERMAN_NAMES} <= TRANSLATIONS["de_DE"].keys()
 
 

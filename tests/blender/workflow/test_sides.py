@@ -20,7 +20,7 @@ QUICK = ("--eigenpairs", 60, "--energies", 40, "--segments", 5)
 ON_SIDES = ("paw", "foot", "ear_tip")
 ALONE = ("nose", "snout", "neck", "waist", "tail_3", "tail_6")
 NO_SIDES = "No segment has parts on both sides"
-NOT_IN_PAPER = "Left and right are not told apart with the method of the paper: parts are one for both sides"
+NOT_IN_PAPER = "Left and right are not told apart with the method of the paper: both sides are one part"
 
 
 @pytest.fixture

@@ -37,15 +37,14 @@ LABEL_SETTINGS: dict[str, dict[str, Any]] = {
     },
     "sides": {
         "name": "Sides",
-        "description": "Whether the left and the right part of a segment are told apart. Left is where X points when "
-        "the character is at rest",
+        "description": "Whether left and right parts of a segment are told apart; left is where X points at rest",
         "items": [
             ("one", "One Part for Both", "Both sides have the same number, name and color"),
             (
                 "two",
                 "Left and Right",
-                "Names end in .L and .R, left is the lighter color. The number is 1000 more on the left and 2000 more "
-                "on the right. Not with the method of the paper",
+                "Left is lighter and ends in .L, right in .R; numbers are 1000 and 2000 higher; not with the method of "
+                "the paper",
             ),
         ],
         "default": "one",
@@ -89,12 +88,12 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
             (
                 "OBJECTS",
                 "Selected Objects",
-                "Each selected mesh object is a pose. Objects on one armature are one pose",
+                "Each selected mesh object is a pose, and all objects on one armature together are one",
             ),
             (
                 "FRAMES",
                 "Animation Frames",
-                "Frames of the active character's animation. Changes without a keyframe are lost, as in playback",
+                "Frames of the active character's animation; changes without a keyframe are lost, as in playback",
             ),
             ("SHAPE_KEYS", "Shape Keys", "Shape keys of the active character, each at its full value"),
             ("MARKERS", "Timeline Markers", "Frames of the active character's animation that have a marker"),
@@ -270,7 +269,7 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
                 "Hard",
                 "Weight 1 on each vertex of the segment's faces; on a border, in the groups of both sides",
             ),
-            ("soft", "Soft", "Probability of the segment at each vertex. The weights of a vertex sum to 1"),
+            ("soft", "Soft", "Probability of the segment at each vertex; the weights of a vertex sum to 1"),
         ],
         default="none",
     )
