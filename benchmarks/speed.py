@@ -31,8 +31,8 @@ from threadpoolctl import threadpool_limits
 from benchmarks import growth, shapes
 from benchmarks.solvers import METHODS, N_PAIRS
 from wks_segment.core import TriangleMesh, fit_mixture, stiffness_matrix
+from wks_segment.core.learning.standardizer import SIGNATURE_OFFSET
 from wks_segment.core.mesh.triangle_mesh import FloatArray
-from wks_segment.core.segmentation import SIGNATURE_OFFSET
 
 SEGMENTS = 8
 KINDS = ("even", "irregular", "border", "pieces", "thin")

@@ -26,7 +26,7 @@ from benchmarks.speed import table_row
 from wks_segment.blender.scene import file_formats
 from wks_segment.blender.workflow.live_session import session_of
 from wks_segment.core import PoseSegmentation
-from wks_segment.core.labeling.polygons import PosedMesh
+from wks_segment.core.labeling.polygons import PolygonMesh
 
 CHANGES: list[tuple[str, dict[str, Any]]] = [
     ("12 segments", {"n_segments": 12}),
@@ -130,8 +130,8 @@ def run(n_poses: int) -> None:
     assert session.job is not None
     print(f"\nLearned in {took:.1f} seconds: {', '.join(session.job.report.facts[:2])}.\n")
     clock = Clock()
-    clock.wrapped(PosedMesh, "mean", "posteriors")
-    clock.wrapped(PosedMesh, "labeled", "clean-up")
+    clock.wrapped(PolygonMesh, "mean", "posteriors")
+    clock.wrapped(PolygonMesh, "labels", "clean-up")
     clock.wrapped(PoseSegmentation, "polygon_sides", "sides")
     print(table_row(["change", *COLUMNS]))
     print(table_row(["---"] * (1 + len(COLUMNS))))

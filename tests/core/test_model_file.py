@@ -34,11 +34,11 @@ def changed(text, change):
     [
         (lambda c: c.update(format="glTF"), "not a model of WKS Segment"),
         (lambda c: c.update(version=99), "version 99, this program reads 4: update"),
-        (lambda c: c.update(version=3), "version 3, this program reads 4: learn it anew"),
+        (lambda c: c.update(version=3), "version 3, this program reads 4: learn it again"),
         (lambda c: c.pop("means"), "means is missing"),
         (lambda c: c["means"].pop(), r"means has the shape \(23, 20\), not \(24, 20\)"),
         (lambda c: c["means"][0].__setitem__(0, "x"), "means is missing or not numbers"),
-        (lambda c: c["centre"].__setitem__(0, float("nan")), "center has a number that is not finite"),
+        (lambda c: c["centre"].__setitem__(0, float("nan")), "centre has a number that is not finite"),
         (lambda c: c["covariances"].__setitem__(0, -1.0), "not positive"),
         (lambda c: c["spread"].__setitem__(0, 0.0), "not positive"),
         (lambda c: c.update(mixture_covariance_type="round"), "unknown covariance type"),

@@ -1,4 +1,19 @@
-"""The method, without Blender: mesh → surface → laplacian → spectrum → signature → mixture → regions → segmentation."""
+"""The method without Blender: learns the segments of a character from poses, and labels any pose with them.
+
+In the order of use:
+
+- `TriangleMesh` is a pose. `connect` decides once how a mesh is connected in all of its poses; `prepare_surface` makes
+  the welded and refined `Surface` that everything is computed on.
+- `delaunay`, `mass_matrix` and `stiffness_matrix` make the Laplacian, `eigenpairs` solves it, and
+  `heat_kernel_signature` and `wave_kernel_signature` describe each vertex.
+- `PoseSegmentation` does all of this: `describe_all` gives a `PoseSignature` for each pose, `fit` learns segments, and
+  `segment_faces`, `segment_polygons`, `segment_regions` and others label poses. A `Workpiece` is a described pose that
+  is labeled several times. `PartNotes` are names and colors that a user gave, kept with the model.
+- `MemoryCache` and `DiskCache` keep what takes long to compute.
+- `fit_mixture` fits the `GaussianMixture` below it.
+- `rank` tells which of several models fits a shape; `described_alike` groups models that share signatures, and
+  `retrieve` measures a ranking.
+"""
 
 from .learning.gaussian_mixture import GaussianMixture, fit_mixture
 from .mesh.surface import Connection, Surface, connect, prepare_surface

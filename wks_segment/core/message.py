@@ -1,8 +1,8 @@
 """Texts for people that can be shown in another language.
 
-The core knows no language but English, threads must not ask Blender for a translation, and what the command line
-prints is read by programs. So a message is made in English where it is raised, and keeps its template and its values:
-whoever shows it looks the template up and fills it in again.
+The core knows only English, threads must not ask Blender for a translation, and programs read what the command line
+prints. So a message is made in English where it is raised, and keeps its template and its values: the code that shows
+it looks up the template in another language and fills it in again.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from contextlib import suppress
 
 
 class Message(str):
-    """An English text with the template and the values that it was made from.
+    """An English text together with the template and the values that it was made from.
 
     Parameters
     ----------
     template : str
-        With fields as `str.format` has them, each with a name: "{path}: there is no such file".
+        With named fields, as for `str.format`: "{path}: there is no such file".
     **values
-        Of the fields. One that is a `Message` is translated with the message.
+        Values of the fields. A value that is a `Message` is translated together with the message.
     """
 
     template: str
@@ -35,15 +35,15 @@ class Message(str):
 
     @classmethod
     def joined(cls, separator: str, messages: Iterable[str]) -> Message:
-        """Several messages as one, each translated by itself."""
+        """Several messages as one; each is translated by itself."""
         values = {f"part{i}": message for i, message in enumerate(messages)}
         return cls(separator.join(f"{{{name}}}" for name in values), **values)
 
     def translated(self, lookup: Callable[[str], str]) -> str:
-        """The text in another language, given a function from a template to the same template in that language.
+        """The text in another language, given a function that translates a template.
 
-        A template that the function does not know stays English. So does one whose translation cannot be filled in: a
-        translator's mistake must not stop the interface.
+        A template that the function does not know stays English. So does a template whose translation cannot be filled
+        in, because a translator's mistake must not stop the interface.
         """
         if not self.values:
             return lookup(self.template)
@@ -57,8 +57,8 @@ class Message(str):
         return str(self)
 
 
-def message_of(error: BaseException) -> str:
-    """The text of an error; the `Message` itself if it was raised with one, which `str(error)` would lose."""
+def message_of(error: BaseException) -> Message:
+    """The text of an error; the `Message` itself if the error was raised with one, which `str(error)` would lose."""
     if len(error.args) == 1 and isinstance(error.args[0], str):
-        return error.args[0]
-    return str(error)
+        return Message(error.args[0])
+    return Message(str(error))

@@ -1,170 +1,297 @@
-"""Models as JSON: data only, readable by a person, the same bytes on every machine."""
+"""Model files: JSON with data only, readable by people, the same bytes on every machine."""
 
 from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterator
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
-from .labeling.region_atlas import FIELDS, PLANES
-from .learning.gaussian_mixture import CovarianceType
+from .labeling.region_atlas import RegionAtlas
+from .labeling.traits import FIELDS, PLANES
+from .learning.gaussian_mixture import CovarianceType, GaussianMixture
+from .learning.merge_tree import Grouping
+from .learning.parameters import PARAMETERS, check_parameters, effective
+from .learning.standardizer import LEAST_SPREAD, Standardizer
 from .mesh.triangle_mesh import FloatArray, IntArray
+from .message import Message, message_of
 from .user_labels import PartNotes
 
 FORMAT = "wks_segment model"
-VERSION = 4
-PARAMETERS = (
-    "n_segments", "covariance_type", "n_eigenpairs", "n_energies", "accuracy", "random_state", "scaling",
-    "pieces", "laplacian", "smoothness", "preset",
-)  # fmt: skip
-LARGEST = {"n_segments": 1000, "n_eigenpairs": 5000, "n_energies": 1000}
-"""A file that asks for more would have a mesh refined until the memory is full."""
-LEAST, MOST = 1e-6, 1e6
-"""Sizes of numbers in a model: spreads lie between them, their squares bound variances. Beyond, single precision would
-lose a signature's digits, or overflow."""
+MODEL_VERSION = 4
+"""To be raised whenever older programs would misread a new file, or this program an old one."""
+MOST_OF_PARAMETER = {"n_segments": 1000, "n_eigenpairs": 5000, "n_energies": 1000}
+"""Upper bounds of parameters in a file: with more, a mesh would be refined until the memory is full."""
+MOST_NUMBER = 1e6
+"""Upper bound of numbers in a file, whose squares bound variances: beyond, single precision would overflow."""
 MOST_COMPONENTS, MOST_REGIONS, MOST_POSES = 1100, 400, 10_000
-KINDS = ("region", "sided")
-"""Of regions: wholes, and segments by which left and right are told."""
+"""Upper bounds of counts in a file: above what any fit makes, and small enough to be checked in a second."""
+REGION_KINDS = ("region", "sided")
+"""The two atlases of a file: of wholes, and of segments by which left and right are told."""
 MAX_BYTES = 20 * 2**20
-"""A file above this is not read, nor written: what is in there could take longer than a second. 64 segments with
-diagonal covariances take 300 kB, 8 with full ones 2 MB."""
+"""Maximum size of a file, which would take more than a second to read: 64 segments with diagonal covariances take
+300 kB, 8 with full ones 2 MB."""
+_POSITIVE = float(np.nextafter(0.0, 1.0))
 
 
 class ModelFileError(ValueError):
     """The file or text is not a model that this version can read; the message says why."""
 
 
-def encode(
-    parameters: dict[str, Any], arrays: dict[str, FloatArray | IntArray], covariance_type: CovarianceType,
-    notes: PartNotes,
-) -> str:  # fmt: skip
+@dataclass(frozen=True)
+class ModelContent:
+    """Everything that a model file holds.
+
+    Attributes
+    ----------
+    parameters : dict
+        Of the model, by name.
+    mixture : GaussianMixture
+    standardizer : Standardizer
+    grouping : Grouping or None
+    atlases : (RegionAtlas, RegionAtlas) or None
+        Of wholes and of segments.
+    usual_scores : (poses,) array
+    part_notes : PartNotes
+    """
+
+    parameters: dict[str, Any]
+    mixture: GaussianMixture
+    standardizer: Standardizer
+    grouping: Grouping | None
+    atlases: tuple[RegionAtlas, RegionAtlas] | None
+    usual_scores: FloatArray
+    part_notes: PartNotes
+
+
+def encode(model: ModelContent) -> str:
     """JSON text of a model."""
+    mixture = model.mixture
+    arrays: dict[str, FloatArray | IntArray] = {
+        "centre": model.standardizer.mean, "spread": model.standardizer.spread, "weights": mixture.weights,
+        "means": mixture.means, "covariances": mixture.covariances, "usual_scores": model.usual_scores,
+    }  # fmt: skip
+    if model.grouping is not None:
+        arrays["joins"] = model.grouping.pairs
+        arrays |= {name: getattr(model.grouping, name) for name in ("certainties", "by_chance", "cuts")}
+    for kind, atlas in zip(REGION_KINDS, model.atlases or (), strict=False):
+        arrays |= atlas.arrays(kind)
     content = {
         "format": FORMAT,
-        "version": VERSION,
-        "parameters": parameters,
-        "mixture_covariance_type": covariance_type,
-        **notes.as_json(),
+        "version": MODEL_VERSION,
+        "parameters": {name: model.parameters[name] for name in PARAMETERS},
+        "mixture_covariance_type": mixture.covariance_type,
+        **model.part_notes.as_json(),
         **{name: array.tolist() for name, array in arrays.items()},
     }
-    return json.dumps(content, default=_plain, allow_nan=False)
+    return json.dumps(content, default=_as_python, allow_nan=False)
 
 
-def decode(text: str) -> tuple[dict[str, Any], dict[str, FloatArray], CovarianceType, PartNotes]:
-    """Parameters, arrays, covariance type and notes of a model, all checked; ModelFileError if anything is off."""
+def decode(text: str) -> ModelContent:
+    """The model in JSON text, with every value checked; ModelFileError if anything is wrong."""
+    content = _content(text)
+    parameters = _parameters(content)
+    covariance_type: CovarianceType = content.get("mixture_covariance_type")  # type: ignore[assignment]  # checked next
+    if covariance_type not in get_args(CovarianceType):
+        raise _damaged(Message("unknown covariance type {value!r}", value=covariance_type))
+    grouped = parameters["preset"] != "paper"
+    arrays = {field.name: _array(content, field) for field in _fields(content, parameters, covariance_type, grouped)}
+    n_components = len(arrays["weights"])
+    if grouped:
+        _check_joins(arrays["joins"], n_components)
+        for kind in REGION_KINDS:
+            _check_groups(arrays, kind, n_components)
+    _check_variances(arrays["covariances"], covariance_type)
+    if abs(arrays["weights"].sum() - 1) > 1e-6:
+        raise _damaged(Message("the weights do not sum to 1"))
+    try:
+        part_notes = PartNotes.of_json(content)
+    except ValueError as error:
+        raise _damaged(message_of(error)) from error
+    try:
+        check_parameters(parameters)
+    except (ValueError, TypeError) as error:
+        raise ModelFileError(Message("the model has a bad parameter: {reason}", reason=message_of(error))) from error
+    grouping, atlases = None, None
+    if grouped:
+        joins = arrays["joins"].astype(np.int64)
+        grouping = Grouping(joins, arrays["certainties"], arrays["by_chance"], arrays["cuts"])
+        wholes, segments = (RegionAtlas.of_arrays(arrays, kind) for kind in REGION_KINDS)
+        atlases = wholes, segments
+    return ModelContent(
+        parameters,
+        GaussianMixture(covariance_type, arrays["weights"], arrays["means"], arrays["covariances"]),
+        Standardizer(effective(parameters, "scaling"), arrays["centre"], arrays["spread"]),
+        grouping,
+        atlases,
+        arrays["usual_scores"],
+        part_notes,
+    )
+
+
+class _Field(NamedTuple):
+    """An array of a model file: name, shape, bounds of its numbers, and whether they are whole."""
+
+    name: str
+    shape: tuple[int, ...]
+    least: float = -MOST_NUMBER
+    most: float = MOST_NUMBER
+    whole: bool = False
+
+
+def _fields(
+    content: dict[str, Any], parameters: dict[str, Any], covariance_type: CovarianceType, grouped: bool
+) -> Iterator[_Field]:
+    """All arrays of a model file, with the shapes that its counts give."""
+    k, d = _n_components(content, parameters["n_segments"]), parameters["n_energies"]
+    covariance_shapes = {"shared": (d,), "diag": (k, d), "spherical": (k,), "tied": (d, d), "full": (k, d, d)}
+    n_poses = _length(content, "usual_scores", MOST_POSES)
+    yield from (
+        _Field("centre", (d,)),
+        _Field("spread", (d,), least=LEAST_SPREAD),
+        _Field("weights", (k,), least=_POSITIVE),
+        _Field("means", (k, d)),
+        _Field("covariances", covariance_shapes[covariance_type], -(MOST_NUMBER**2), MOST_NUMBER**2),
+        _Field("usual_scores", (n_poses,)),
+    )
+    if not grouped:
+        return
+    yield from (
+        _Field("joins", (k - 1, 2)),
+        _Field("certainties", (k,)),
+        _Field("by_chance", (k,)),
+        _Field("cuts", (k,)),
+    )
+    for kind in REGION_KINDS:
+        r = _length(content, f"{kind}_segment", MOST_REGIONS)
+        yield from (
+            _Field(f"{kind}_groups", (), 1, k, whole=True),
+            _Field(f"{kind}_segment", (r,), 0, k - 1, whole=True),
+            _Field(f"{kind}_side", (r,), -1, 1, whole=True),
+            _Field(f"{kind}_area", (r,), least=_POSITIVE),
+            _Field(f"{kind}_signature", (r, FIELDS)),
+            _Field(f"{kind}_handedness", (r, PLANES)),
+            _Field(f"{kind}_distance", (r, r)),
+            _Field(f"{kind}_noise", (4,), least=_POSITIVE),
+        )
+
+
+def _array(content: dict[str, Any], field: _Field) -> FloatArray:
+    """An array of a model file, checked against its field."""
+    name = field.name
+    try:
+        array = np.array(content[name], dtype=np.float64)
+    except (KeyError, ValueError, TypeError, OverflowError) as error:
+        raise _damaged(Message("{name} is missing or not numbers", name=name)) from error
+    if array.shape != field.shape:
+        raise _damaged(
+            Message("{name} has the shape {shape}, not {expected}", name=name, shape=array.shape, expected=field.shape)
+        )
+    if not np.isfinite(array).all():
+        raise _damaged(Message("{name} has a number that is not finite", name=name))
+    outside = array[(array < field.least) | (array > field.most) | (field.whole & (array % 1 != 0))]
+    if not outside.size:
+        return array
+    value = float(outside[0])
+    if field.whole:
+        raise _damaged(
+            Message("{name} has the number {value:g}, which is not a whole number from {least:g} to {most:g}",
+                    name=name, value=value, least=field.least, most=field.most)
+        )  # fmt: skip
+    if field.least > 0 and value < field.least:
+        raise _damaged(Message("{name} has a number that is not positive, or far too small", name=name))
+    raise _damaged(Message("{name} has a number of {value:.3g}, too large", name=name, value=value))
+
+
+def _content(text: str) -> dict[str, Any]:
+    """The JSON object in a text, if it is a model of this version."""
     try:
         content = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise ModelFileError(f"this is not a model of WKS Segment: it is no JSON ({error})") from error
+        raise ModelFileError(
+            Message("this is not a model of WKS Segment: it is not JSON ({reason})", reason=message_of(error))
+        ) from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise ModelFileError("this is not a model of WKS Segment")
-    if content.get("version") != VERSION:
-        older = isinstance(content.get("version"), int) and content["version"] < VERSION
-        raise ModelFileError(
-            f"the model has version {content.get('version')!r}, this program reads {VERSION}: "
-            f"{'learn it anew' if older else 'update WKS Segment'}"
-        )
+    version = content.get("version")
+    if version != MODEL_VERSION:
+        if isinstance(version, int) and version < MODEL_VERSION:
+            template = "the model has version {version!r}, this program reads {known}: learn it again"
+        else:
+            template = "the model has version {version!r}, this program reads {known}: update WKS Segment"
+        raise ModelFileError(Message(template, version=version, known=MODEL_VERSION))
+    return content
+
+
+def _parameters(content: dict[str, Any]) -> dict[str, Any]:
+    """The parameters, of which only names and sizes are checked: they decide what else a file must hold."""
     parameters = content.get("parameters")
     if not isinstance(parameters, dict) or set(parameters) != set(PARAMETERS):
-        raise ModelFileError(f"the model is damaged: its parameters are not {', '.join(PARAMETERS)}")
-    covariance_type: CovarianceType = content.get("mixture_covariance_type")  # type: ignore[assignment]  # checked below
-    for name, most in LARGEST.items():
-        if isinstance(parameters[name], int) and parameters[name] > most:
-            raise ModelFileError(f"the model is damaged: {name} is {parameters[name]}, more than {most}")
-    k, d = _n_components(content, parameters["n_segments"]), parameters["n_energies"]
-    grouped: dict[str, tuple[int, ...]] = {}
-    if parameters["preset"] != "paper":
-        grouped = {"joins": (k - 1, 2), "certainties": (k,), "by_chance": (k,), "cuts": (k,)}
-        for kind in KINDS:
-            r = _length(content, f"{kind}_segment", MOST_REGIONS)
-            of_regions = {
-                "segment": (r,), "side": (r,), "area": (r,), "distance": (r, r), "signature": (r, FIELDS),
-                "handedness": (r, PLANES), "groups": (), "noise": (4,),
-            }  # fmt: skip
-            grouped |= {f"{kind}_{name}": shape for name, shape in of_regions.items()}
-    n_poses = _length(content, "usual_scores", MOST_POSES)
-    if not n_poses:
-        raise ModelFileError("the model is damaged: usual_scores is empty")
-    shapes = {"shared": (d,), "diag": (k, d), "spherical": (k,), "tied": (d, d), "full": (k, d, d)}
-    if covariance_type not in get_args(CovarianceType):
-        raise ModelFileError(f"the model is damaged: unknown covariance type {covariance_type!r}")
-    arrays = {
-        name: _array(content, name, shape)
-        for name, shape in {
-            "centre": (d,), "spread": (d,), "weights": (k,), "means": (k, d), "covariances": shapes[covariance_type],
-            "usual_scores": (n_poses,), **grouped,
-        }.items()
-    }  # fmt: skip
-    if grouped:
-        _check_joins(arrays["joins"], k)
-        for kind in KINDS:
-            _check_regions(arrays, kind, k)
-    for name, array in arrays.items():
-        if np.abs(array).max(initial=0) > (MOST**2 if name == "covariances" else MOST):
-            raise ModelFileError(f"the model is damaged: {name} has a number of {np.abs(array).max():.3g}, too large")
-    variances = arrays["covariances"]
-    if covariance_type in ("tied", "full"):
-        variances = np.diagonal(variances, axis1=-2, axis2=-1)
-    if arrays["spread"].min() < LEAST or variances.min() < LEAST**2:
-        raise ModelFileError("the model is damaged: a spread or a variance is not positive, or far too small")
-    if covariance_type in ("tied", "full"):
-        positive = bool((np.linalg.eigvalsh(arrays["covariances"]) > 0).all())
-    else:
-        positive = bool((arrays["covariances"] > 0).all())
-    if not (positive and (arrays["spread"] > 0).all() and (arrays["weights"] > 0).all()):
-        raise ModelFileError("the model is damaged: a variance or a weight is not positive")
-    if abs(arrays["weights"].sum() - 1) > 1e-6:
-        raise ModelFileError("the model is damaged: the weights do not sum to 1")
-    try:
-        notes = PartNotes.of_json(content)
-    except ValueError as error:
-        raise ModelFileError(f"the model is damaged: {error}") from error
-    return parameters, arrays, covariance_type, notes
+        raise _damaged(Message("its parameters are not {names}", names=", ".join(PARAMETERS)))
+    for name, most in MOST_OF_PARAMETER.items():
+        value = parameters[name]
+        if isinstance(value, int) and value > most:
+            raise _damaged(Message("{name} is {value}, more than {most}", name=name, value=value, most=most))
+    return parameters
 
 
 def _n_components(content: dict[str, Any], n_segments: Any) -> int:
-    """Components of the mixture: as many as weights."""
+    """Number of components of the mixture, which is the number of weights."""
     count = _length(content, "weights", MOST_COMPONENTS)
     if n_segments != "auto" and (not isinstance(n_segments, int) or n_segments > count):
-        raise ModelFileError(f"the model is damaged: {n_segments} segments of {count} components")
+        raise _damaged(Message("{segments} segments of {count} components", segments=n_segments, count=count))
     return count
 
 
 def _length(content: dict[str, Any], name: str, most: int) -> int:
+    """Length of a list in a model file, from 1 to a maximum."""
     numbers = content.get(name)
     if not isinstance(numbers, list) or len(numbers) > most:
-        raise ModelFileError(f"the model is damaged: {name} is missing, or has too many numbers")
+        raise _damaged(Message("{name} is missing, or has too many numbers", name=name))
+    if not numbers:
+        raise _damaged(Message("{name} is empty", name=name))
     return len(numbers)
 
 
 def _check_joins(joins: FloatArray, n_components: int) -> None:
-    """Each join is of two groups that are there, named by the larger one's name in it."""
-    alive = set(range(n_components))
+    """Each join must be of two different groups that exist at this step; the joined group has the name of the first."""
+    groups = set(range(n_components))
     for i, j in joins.tolist():
-        if not (i in alive and j in alive and i != j):
-            raise ModelFileError(f"the model is damaged: joins has the pair {i:g}, {j:g}, which cannot be joined")
-        alive.remove(j)
+        if not (i in groups and j in groups and i != j):
+            raise _damaged(Message("joins has the pair {i:g}, {j:g}, which cannot be joined", i=i, j=j))
+        groups.remove(j)
 
 
-def _check_regions(arrays: dict[str, FloatArray], kind: str, n_components: int) -> None:
-    """Regions belong to groups that are there, have an area, and are left, right or neither."""
-    groups, segment = arrays[f"{kind}_groups"], arrays[f"{kind}_segment"]
-    if not (1 <= groups <= n_components and groups % 1 == 0):
-        raise ModelFileError(f"the model is damaged: {kind}_groups is {groups:g}, not a number of groups")
-    if not (len(segment) and (segment % 1 == 0).all() and (segment >= 0).all() and (segment < groups).all()):
-        raise ModelFileError(f"the model is damaged: {kind}_segment has a number that is none of {groups:g} groups")
-    if not np.isin(arrays[f"{kind}_side"], (-1, 0, 1)).all():
-        raise ModelFileError(f"the model is damaged: {kind}_side has a number that is not -1, 0 or 1")
-    if not ((arrays[f"{kind}_area"] > 0).all() and (arrays[f"{kind}_noise"] > 0).all()):
-        raise ModelFileError(f"the model is damaged: {kind}_area or {kind}_noise is not positive")
+def _check_groups(arrays: dict[str, FloatArray], kind: str, n_components: int) -> None:
+    """Each region must belong to one of the groups of its atlas."""
+    groups, segment = float(arrays[f"{kind}_groups"]), arrays[f"{kind}_segment"]
+    if (segment >= groups).any():
+        raise _damaged(
+            Message("{name} has a number that is none of {groups:g} groups", name=f"{kind}_segment", groups=groups)
+        )
+
+
+def _check_variances(covariances: FloatArray, covariance_type: CovarianceType) -> None:
+    """Variances must not be too small, and matrices must be positive definite."""
+    matrices = covariance_type in ("tied", "full")
+    variances = np.diagonal(covariances, axis1=-2, axis2=-1) if matrices else covariances
+    if variances.min() < LEAST_SPREAD**2:
+        raise _damaged(Message("a variance is not positive, or far too small"))
+    if matrices and not (np.linalg.eigvalsh(covariances) > 0).all():
+        raise _damaged(Message("a covariance matrix is not positive definite"))
+
+
+def _damaged(reason: Message) -> ModelFileError:
+    return ModelFileError(Message("the model is damaged: {reason}", reason=reason))
 
 
 def write(path: str | PathLike[str], text: str) -> None:
-    """Write text to a file so that a failure half-way leaves an older file as it was.
+    """Write text to a file; if this fails half-way, an older file is left as it was.
 
     Raises
     ------
@@ -175,12 +302,16 @@ def write(path: str | PathLike[str], text: str) -> None:
     """
     if len(text) > MAX_BYTES:
         raise ValueError(
-            f"the model takes {len(text) / 2**20:.0f} MB, and only {MAX_BYTES / 2**20:.0f} MB would be read again: "
-            "take fewer segments or energies, or another covariance than full"
+            Message(
+                "the model takes {size:.0f} MB, but at most {most:.0f} MB can be read again: "
+                "take fewer segments or energies, or a covariance other than full",
+                size=len(text) / 2**20,
+                most=MAX_BYTES / 2**20,
+            )
         )
     target = Path(path).resolve()
     if target.exists() and not os.access(target, os.W_OK):
-        raise PermissionError(f"{target} may not be written to")
+        raise PermissionError(Message("{path} is write-protected", path=target))
     temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
     try:
         with temporary.open("x", encoding="utf-8") as file:
@@ -192,30 +323,18 @@ def write(path: str | PathLike[str], text: str) -> None:
 
 
 def read(path: str | PathLike[str]) -> str:
-    """Text of a model file; ModelFileError if it is too large or no text."""
+    """Text of a model file; ModelFileError if it is too large or not text."""
     size = Path(path).stat().st_size
     if size > MAX_BYTES:
-        raise ModelFileError(f"{size / 2**20:.0f} MB is too large for a model")
+        raise ModelFileError(Message("{size:.0f} MB is too large for a model", size=size / 2**20))
     try:
         return Path(path).read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
         raise ModelFileError("this is not a model of WKS Segment, but a binary file") from error
 
 
-def _array(content: dict[str, Any], name: str, shape: tuple[int, ...]) -> FloatArray:
-    try:
-        array = np.array(content[name], dtype=np.float64)
-    except (KeyError, ValueError, TypeError, OverflowError) as error:
-        raise ModelFileError(f"the model is damaged: {name} is missing or not numbers") from error
-    if array.shape != shape:
-        raise ModelFileError(f"the model is damaged: {name} has the shape {array.shape}, not {shape}")
-    if not np.isfinite(array).all():
-        raise ModelFileError(f"the model is damaged: {name} has a number that is not finite")
-    return array
-
-
-def _plain(value: object) -> object:
-    """NumPy's numbers as Python's own."""
+def _as_python(value: object) -> object:
+    """A NumPy number as a number of Python."""
     if isinstance(value, np.generic):
         return value.item()
     raise TypeError(f"{type(value).__name__} cannot be written to a model")

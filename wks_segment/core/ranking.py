@@ -1,9 +1,9 @@
-"""Which model fits a shape: the paper's retrieval (section 5), between models of any settings.
+"""Which model fits a shape: the retrieval of the paper (section 5), between models of any settings.
 
-A shape is of the class under whose mixture its signatures are likeliest: compared is
-`PoseSegmentation.comparable_score`. Models of the same settings are compared by it as it is. Between those of other
-settings, which describe shapes in other numbers, counts how far it is from what models of these settings give to their
-own learned poses when they are left out. The same tells what is too little for any class.
+A shape belongs to the class under whose mixture its signatures are likeliest, by `PoseSegmentation.comparable_score`.
+Scores of models with the same settings are compared directly. Models with other settings describe shapes by other
+numbers; between them, each score is compared with the scores that models of these settings usually give to their own
+learned poses when these are left out. The usual scores also tell when a shape fits no class.
 """
 
 from __future__ import annotations
@@ -15,19 +15,20 @@ from typing import Literal
 import numpy as np
 
 from .mesh.triangle_mesh import FloatArray, IntArray
+from .message import Message
 from .poses.pose_signature import PoseSignature
 from .segmentation import PoseSegmentation
 
 Verdict = Literal["sure", "unsure", "nothing fits"]
-WIDTH = 0.15
-"""Difference of two comparable scores at which one model is e times as probable as the other: so that, of answers with
-some probability, about that share is right (Princeton classes, five choices of what is learned)."""
-SURE = 0.95
-"""Probability of the best model from which on it is sure."""
-TOLERATED = 0.5
-"""How far a score may lie below those that a model usually gives: few shapes of a class do, …"""
-SPREADS = 3.0
-"""… or how many of their standard deviations, if that is more."""
+SCORE_WIDTH = 0.15
+"""Difference of two comparable scores at which one model is e times as probable as the other. With it, of the answers
+with some probability about this share is right (Princeton classes, five choices of learned shapes)."""
+SURE_PROBABILITY = 0.95
+"""Probability above which the best model counts as sure."""
+TOLERATED_DIFFERENCE = 0.5
+"""A shape fits a model if its score is at most this much below the scores that the model usually gives …"""
+TOLERATED_DEVIATIONS = 3.0
+"""… or at most this many of their standard deviations, if that is more."""
 
 
 @dataclass(frozen=True)
@@ -37,14 +38,14 @@ class Rank:
     Attributes
     ----------
     index : int
-        Of the model among those that were ranked.
+        Index of the model among the ranked ones.
     score : float
-        Mean of `PoseSegmentation.comparable_score` over the poses; 0 is what is usual for learned poses of models with
-        these settings.
+        Mean of `PoseSegmentation.comparable_score` over the poses, minus the usual score of learned poses of models
+        with the same settings.
     probability : float
-        Among the models of the ranking.
+        Probability among the models of the ranking.
     fits : bool
-        Whether the score is not far below those of the model's own poses.
+        Whether the score is not far below the scores of the model's own poses.
     """
 
     index: int
@@ -55,7 +56,7 @@ class Rank:
 
 @dataclass(frozen=True)
 class Ranking:
-    """Models, best first, and how sure that is."""
+    """Models, best first, and a verdict on the best one."""
 
     ranks: tuple[Rank, ...]
     verdict: Verdict
@@ -68,14 +69,14 @@ class Ranking:
 
 @dataclass(frozen=True)
 class Retrieval:
-    """What came of queries of several classes.
+    """Results of queries from several classes.
 
     Attributes
     ----------
     names : list of str
-        Of the classes.
+        Names of the classes.
     confusion : (c, c) int array
-        Queries of class i that were taken for class j.
+        Number of queries of class i that were taken for class j.
     verdicts : dict
         For each verdict the numbers of right and of wrong answers.
     """
@@ -86,12 +87,12 @@ class Retrieval:
 
     @property
     def right(self) -> int:
-        """Queries that were taken for what they are."""
+        """Number of queries that were assigned to their own class."""
         return int(np.trace(self.confusion))
 
     @property
     def asked(self) -> int:
-        """Queries."""
+        """Number of queries."""
         return int(self.confusion.sum())
 
     @property
@@ -101,87 +102,98 @@ class Retrieval:
 
 
 def described_alike(models: Sequence[PoseSegmentation]) -> list[list[int]]:
-    """Indices of models together that take the same signature of a pose."""
-    together: dict[tuple[object, ...], list[int]] = {}
+    """Indices of models in groups; the models of a group take the same signature of a pose."""
+    groups: dict[tuple[object, ...], list[int]] = {}
     for i, model in enumerate(models):
-        together.setdefault((*sorted(model.describing().items()), model.pieces), []).append(i)
-    return list(together.values())
+        groups.setdefault((*sorted(model.describing().items()), model.pieces), []).append(i)
+    return list(groups.values())
 
 
 def rank(models: Sequence[PoseSegmentation], poses: Sequence[Sequence[PoseSignature]]) -> Ranking:
-    """Say which models fit a shape.
+    """Rank models by how well they fit a shape.
+
+        ranking = rank(models, [[model.describe(mesh)] for model in models])
+        if ranking.verdict != "nothing fits":
+            labels = models[ranking.best.index].segment_faces(mesh)
 
     Parameters
     ----------
     models
-        Fitted.
+        Fitted models.
     poses
-        For each model the poses of the shape, described by it, or by one that `described_alike` puts it together with.
+        For each model the poses of the shape, described by this model, or by another one of its group in
+        `described_alike`.
 
     Raises
     ------
     ValueError
-        If there is no model or no pose, or a signature is not by a model's settings.
+        If there is no model or no pose, or a signature was made with other settings than those of the model.
     """
-    if not models or len(models) != len(poses) or not all(len(of_model) for of_model in poses):
-        raise ValueError(f"there are {len(models)} models, and poses for {sum(map(bool, map(len, poses)))} of them")
+    if not models or len(models) != len(poses) or not all(len(described) for described in poses):
+        raise ValueError(
+            Message(
+                "there are {models} models, and poses for {described} of them",
+                models=len(models),
+                described=sum(map(bool, map(len, poses))),
+            )
+        )
     scores = np.array([
-        np.mean([model.comparable_score(pose) for pose in of_model])
-        for model, of_model in zip(models, poses, strict=True)
+        np.mean([model.comparable_score(pose) for pose in described])
+        for model, described in zip(models, poses, strict=True)
     ])  # fmt: skip
     return ranking_of(scores, [model.usual_scores_ for model in models], [_settings(model) for model in models])
 
 
 def ranking_of(scores: FloatArray, usual: Sequence[FloatArray], settings: Sequence[Hashable]) -> Ranking:
-    """Of models' scores for a shape, those that each usually gives, and its settings."""
+    """Ranking by the score of a shape, the usual scores and the settings of each model."""
     fits = [score >= least_usual(of_model) for score, of_model in zip(scores, usual, strict=True)]
-    levels: dict[Hashable, list[float]] = {each: [] for each in settings}
-    for each, of_model in zip(settings, usual, strict=True):
-        levels[each].append(float(np.mean(of_model)))
-    above = scores - np.array([np.mean(levels[each]) for each in settings])
-    weights = np.exp((above - above.max()) / WIDTH)
+    means_by_settings: dict[Hashable, list[float]] = {}
+    for setting, of_model in zip(settings, usual, strict=True):
+        means_by_settings.setdefault(setting, []).append(float(np.mean(of_model)))
+    relative = scores - np.array([np.mean(means_by_settings[setting]) for setting in settings])
+    weights = np.exp((relative - relative.max()) / SCORE_WIDTH)
     ranks = tuple(
-        Rank(int(i), float(above[i]), float(weights[i] / weights.sum()), bool(fits[i]))
-        for i in np.argsort(-above, kind="stable")
+        Rank(int(i), float(relative[i]), float(weights[i] / weights.sum()), bool(fits[i]))
+        for i in np.argsort(-relative, kind="stable")
     )
     if not ranks[0].fits:
         return Ranking(ranks, "nothing fits")
-    return Ranking(ranks, "sure" if ranks[0].probability >= SURE else "unsure")
+    return Ranking(ranks, "sure" if ranks[0].probability >= SURE_PROBABILITY else "unsure")
 
 
 def _settings(model: PoseSegmentation) -> Hashable:
-    """What scores depend on beside the class."""
+    """Everything besides the class that scores depend on."""
     described = (*sorted(model.describing().items()), model.pieces, model.preset)
     return (*described, model.scaling, model.covariance_type, len(model.mixture_.weights))
 
 
 def least_usual(usual: FloatArray) -> float:
-    """The score below which a shape is of another class, given those of a model's own poses."""
-    spread = float(np.std(usual, ddof=1)) if len(usual) > 1 else 0.0
-    return float(np.mean(usual)) - max(TOLERATED, SPREADS * spread)
+    """Score below which a shape belongs to another class, given the usual scores of a model."""
+    deviation = float(np.std(usual, ddof=1)) if len(usual) > 1 else 0.0
+    return float(np.mean(usual)) - max(TOLERATED_DIFFERENCE, TOLERATED_DEVIATIONS * deviation)
 
 
 def spread_evenly(count: int, n_learned: int) -> list[int]:
-    """Which of `count` shapes in a row are learned from: at equal steps, the first among them."""
+    """Indices of the shapes to learn from, at equal steps among `count` shapes, beginning with the first."""
     return [i * count // n_learned for i in range(n_learned)]
 
 
 def retrieve(models: Mapping[str, PoseSegmentation], queries: Mapping[str, Sequence[PoseSignature]]) -> Retrieval:
-    """Ask for the class of each query.
+    """Find the class of each query.
 
     Parameters
     ----------
     models
-        Of each class, fitted, all with the same settings.
+        Fitted model of each class, all with the same settings.
     queries
-        Shapes of each class that were not learned, described by these settings.
+        Shapes of each class that were not learned, described with these settings.
     """
     names = list(models)
     confusion = np.zeros((len(names), len(names)), dtype=np.int64)
     verdicts = {verdict: [0, 0] for verdict in ("sure", "unsure", "nothing fits")}
     for i, name in enumerate(names):
         for query in queries[name]:
-            found = rank(list(models.values()), [[query]] * len(names))
-            confusion[i, found.best.index] += 1
-            verdicts[found.verdict][int(found.best.index != i)] += 1
+            ranking = rank(list(models.values()), [[query]] * len(names))
+            confusion[i, ranking.best.index] += 1
+            verdicts[ranking.verdict][int(ranking.best.index != i)] += 1
     return Retrieval(names, confusion, {verdict: (right, wrong) for verdict, (right, wrong) in verdicts.items()})

@@ -1,4 +1,4 @@
-"""What a user has said of a model's parts: their names, their colors, and which are one. The core only keeps it."""
+"""Names, colors and joins that a user gave to the parts of a model. The core only keeps them with the model."""
 
 from __future__ import annotations
 
@@ -6,26 +6,28 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
+from .message import Message
+
 MOST_PARTS = 3000
-"""Parts are numbered below this."""
+"""Parts are numbered below this: segments up to 1000, and their left and right sides."""
 LONGEST_NAME = 50
-"""Letters: Blender cuts names off at 63 bytes, and those of vertex groups have a word before."""
+"""Maximum length of a name in letters: Blender cuts names off at 63 bytes, and vertex groups have a word before it."""
 Color = tuple[float, float, float]
-T = TypeVar("T")
+Note = TypeVar("Note")
 
 
 @dataclass(frozen=True)
 class PartNotes:
-    """Notes on parts, by their number; a part without any is as the program has it.
+    """What a user said about parts, by their numbers; a part that is missing has its defaults.
 
     Attributes
     ----------
     names
-        No two the same.
+        Names of parts, all different.
     colors
-        sRGB, 0 to 1.
+        sRGB colors of parts, 0 to 1.
     joined
-        For a part that is joined with another, the other, which is joined with none itself.
+        For a part that is joined with another one, the number of that other, which is itself joined with none.
     """
 
     names: Mapping[int, str] = field(default_factory=dict)
@@ -33,19 +35,19 @@ class PartNotes:
     joined: Mapping[int, int] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
-        """What `of_json` reads, without fields that say nothing."""
+        """Fields of a JSON object that `of_json` reads; empty ones are left out."""
         fields = {"part_names": self.names, "part_colors": self.colors, "joined_parts": self.joined}
         return {name: {str(part): notes[part] for part in sorted(notes)} for name, notes in fields.items() if notes}
 
     @classmethod
     def of_json(cls, content: Any) -> PartNotes:
-        """The notes among the fields of a JSON object; ValueError if one is damaged."""
+        """The notes among the fields of a JSON object; ValueError if a field is damaged."""
         if not isinstance(content, dict):
-            raise ValueError("there are no named fields")
+            raise ValueError("the notes on parts have no named fields")
         notes = cls(
-            _read(content, "part_names", _name, f"a name of up to {LONGEST_NAME} letters"),
-            _read(content, "part_colors", _color, "a color of three numbers from 0 to 1"),
-            _read(content, "joined_parts", _part, "a part"),
+            _read_notes(content, "part_names", _name, Message("a name of up to {most} letters", most=LONGEST_NAME)),
+            _read_notes(content, "part_colors", _color, Message("a color of three numbers from 0 to 1")),
+            _read_notes(content, "joined_parts", _number, Message("the number of a part")),
         )
         if len(set(notes.names.values())) < len(notes.names):
             raise ValueError("part_names has a name twice")
@@ -54,18 +56,26 @@ class PartNotes:
         return notes
 
 
-def _read(content: dict[str, Any], name: str, read: Callable[[Any], T | None], kind: str) -> dict[int, T]:
-    given = content.get(name, {})
-    if not isinstance(given, dict):
-        raise ValueError(f"{name} has no names of its entries")
-    notes: dict[int, T] = {}
-    for key, value in given.items():
+def _read_notes(
+    content: dict[str, Any], name: str, read: Callable[[Any], Note | None], expected: str
+) -> dict[int, Note]:
+    """Notes of one field, each read by a function that returns None for a damaged one."""
+    entries = content.get(name, {})
+    if not isinstance(entries, dict):
+        raise ValueError(Message("{name} is not a list of entries by part", name=name))
+    notes: dict[int, Note] = {}
+    for key, value in entries.items():
         part = int(key) if key.isascii() and key.isdecimal() and len(key) < 5 else MOST_PARTS
         if part >= MOST_PARTS or part in notes:
-            raise ValueError(f"{name} has an entry {key[:20]!r}, which is no part or is there twice")
+            raise ValueError(
+                Message("{name} has an entry {key!r}, which is not a part or is there twice", name=name, key=key[:20])
+            )
         note = read(value)
         if note is None:
-            raise ValueError(f"{name} has for part {part} something else than {kind}")
+            raise ValueError(
+                Message("{name} has for part {part} something other than {expected}", name=name, part=part,
+                        expected=expected)
+            )  # fmt: skip
         notes[part] = note
     return notes
 
@@ -84,5 +94,5 @@ def _color(value: Any) -> Color | None:
     return red, green, blue
 
 
-def _part(value: Any) -> int | None:
+def _number(value: Any) -> int | None:
     return value if type(value) is int and 0 <= value < MOST_PARTS else None

@@ -6,7 +6,7 @@ from shapes import creature, icosphere, together
 
 from wks_segment.core import TriangleMesh, prepare_surface
 from wks_segment.core.geometry.normalized_cuts import normalized_cut
-from wks_segment.core.learning.merge_tree import Ground
+from wks_segment.core.learning.merge_tree import PoseGeometry
 
 
 def dumbbell(rings=60, around=40):
@@ -54,7 +54,7 @@ def test_thousands_of_islands_need_no_table_of_all_pairs():
 
 def test_a_dumbbell_has_two_parts_that_meet_at_its_neck():
     surface = prepare_surface(dumbbell())
-    part = Ground.of(surface).part[1]
+    part = PoseGeometry.of(surface).cuts[1]
     x = surface.original.face_centers[:, 0]
     left, right = np.unique(part[x < -0.3]), np.unique(part[x > 0.3])
     assert len(left) == len(right) == 1
@@ -64,15 +64,15 @@ def test_a_dumbbell_has_two_parts_that_meet_at_its_neck():
 def test_islands_are_different_parts():
     body, ball = creature(0.3, 4), icosphere(2)
     surface = prepare_surface(together(body, TriangleMesh(ball.vertices + 9, ball.faces)), pieces="separate")
-    for part in Ground.of(surface).part:
+    for part in PoseGeometry.of(surface).cuts:
         assert not set(part[: body.n_faces]) & set(part[body.n_faces :])
 
 
 def test_labels_are_compared_with_parts_by_rand_index():
-    ground = Ground.of(prepare_surface(dumbbell()))
-    shares = ground.surface.original.face_areas / ground.surface.original.area
-    alone = replace(ground, part=ground.part[1:2])
-    assert alone.unlike_parts(ground.part[1]) < 1e-9
+    geometry = PoseGeometry.of(prepare_surface(dumbbell()))
+    shares = geometry.surface.original.face_areas / geometry.surface.original.area
+    alone = replace(geometry, cuts=geometry.cuts[1:2])
+    assert alone.rand_error(geometry.cuts[1]) < 1e-9
     # One label for all faces is wrong for each pair of faces in different parts.
-    apart = np.mean([1 - np.square(np.bincount(part, shares)).sum() for part in ground.part])
-    np.testing.assert_allclose(ground.unlike_parts(np.zeros(len(shares), dtype=int)), apart)
+    apart = np.mean([1 - np.square(np.bincount(part, shares)).sum() for part in geometry.cuts])
+    np.testing.assert_allclose(geometry.rand_error(np.zeros(len(shares), dtype=int)), apart)

@@ -4,7 +4,9 @@ from shapes import LIMBS, figure, icosphere
 
 from wks_segment.core import PoseSegmentation, TriangleMesh
 from wks_segment.core.labeling import labeler
-from wks_segment.core.labeling.region_atlas import RegionAtlas, Traits, sides
+from wks_segment.core.labeling.region_atlas import RegionAtlas
+from wks_segment.core.labeling.sides import region_sides
+from wks_segment.core.labeling.traits import Traits
 
 
 def limb(name, subdivisions=4, radius=0.15):
@@ -93,7 +95,7 @@ def test_poses_vote_on_the_sides_of_their_mesh(model, monkeypatch):
     given = {0.0: [1, 1, 1, 0, -1, 1], 0.1: [1, 1, 0, 0, 1, 1], 0.2: [1, -1, 0, 0, -1, 0], 0.3: [1, 1, 0, 0, -1, 0]}
     poses = [TriangleMesh(mesh.vertices + (0, 0, height), mesh.faces) for height in given]
     votes = iter(given.values())
-    monkeypatch.setattr(labeler, "_sides_seen_in", lambda *arguments: np.array(next(votes)))
+    monkeypatch.setattr(labeler, "_sides_in_pose", lambda *arguments: np.array(next(votes)))
     found = model.polygon_sides(poses, [np.arange(mesh.n_faces) % 6] * 4, np.zeros(6, int))
     assert found.tolist() == [1, 1, 0, 0, -1, 0]
 
@@ -160,16 +162,16 @@ def test_what_was_not_learned_is_numbered_on(model):
 def test_sides_need_one_of_the_same_segment_opposite():
     centers = np.array([(1, 0, 0), (-1, 0.1, 0), (0.01, 0, 1), (0.9, 0, -2), (-0.9, 0, -2), (2, 0, 3)])
     none = np.arange(6)
-    assert sides(centers, np.array([0, 0, 1, 2, 2, 3]), none).tolist() == [1, -1, 0, 1, -1, 0]
-    assert sides(centers, np.array([0, 1, 1, 2, 2, 3]), none).tolist() == [0, 0, 0, 1, -1, 0]
+    assert region_sides(centers, np.array([0, 0, 1, 2, 2, 3]), none).tolist() == [1, -1, 0, 1, -1, 0]
+    assert region_sides(centers, np.array([0, 1, 1, 2, 2, 3]), none).tolist() == [0, 0, 0, 1, -1, 0]
 
 
 def test_bent_sides_are_told_from_which_is_which_in_the_mirror_image():
     """Four limbs of one segment that have swung to and fro: mirroring brings none to the one opposite."""
     centers = np.array([(0.5, 1, 0), (-0.1, 0, 0), (0.4, -2, 0), (-0.2, -1, 0), (0.0, 9, 0)])
     segment = np.zeros(5, dtype=int)
-    assert sides(centers, segment, np.arange(5)).tolist() != [1, -1, 1, -1, 0]
-    assert sides(centers, segment, np.array([1, 0, 3, 2, 5])).tolist() == [1, -1, 1, -1, 0]
+    assert region_sides(centers, segment, np.arange(5)).tolist() != [1, -1, 1, -1, 0]
+    assert region_sides(centers, segment, np.array([1, 0, 3, 2, 5])).tolist() == [1, -1, 1, -1, 0]
 
 
 def test_left_is_told_from_a_bent_pose_alone():

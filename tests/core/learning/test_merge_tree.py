@@ -3,7 +3,7 @@ import pytest
 from shapes import creature
 
 from wks_segment.core import PoseSegmentation, prepare_surface
-from wks_segment.core.learning.merge_tree import Contacts, Ground, Grouping
+from wks_segment.core.learning.merge_tree import Contacts, Grouping, PoseGeometry
 
 # A row of four components of equal area; between the second and the third there is hardly any border.
 ROW = np.zeros((4, 4))
@@ -96,11 +96,11 @@ def test_the_number_is_the_last_before_certainty_falls():
 
 def test_borders_are_measured_on_the_surface():
     surface = prepare_surface(creature(0.3, 4))
-    ground = Ground.of(surface)
+    geometry = PoseGeometry.of(surface)
     x = surface.original.vertices[surface.original.faces].mean(axis=1)[:, 0]
-    contacts = Contacts.on(ground, np.stack([x < 0, x >= 0], axis=1).astype(float))
-    a, b = ground.adjacency.pairs.T
-    expected = ground.lengths[(x[a] < 0) != (x[b] < 0)].sum()
+    contacts = Contacts.on(geometry, np.stack([x < 0, x >= 0], axis=1).astype(float))
+    a, b = geometry.adjacency.pairs.T
+    expected = geometry.lengths[(x[a] < 0) != (x[b] < 0)].sum()
     np.testing.assert_allclose(contacts.borders, [[0, expected], [expected, 0]])
     np.testing.assert_allclose(contacts.areas.sum(), 1)
     np.testing.assert_allclose(np.diag(contacts.overlaps), contacts.areas)

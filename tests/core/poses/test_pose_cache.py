@@ -74,7 +74,7 @@ def test_a_model_learned_from_workpieces_is_the_same(model, described):
 
 def test_where_all_components_would_be_too_many_numbers_labels_are_nearly_the_same(model, described, monkeypatch):
     usual = model.segment_polygons(described, POLYGONS)
-    monkeypatch.setattr(labeler, "MOST_NUMBERS", 0)
+    monkeypatch.setattr(labeler, "MOST_POSTERIORS", 0)
     assert (model.segment_polygons(described, POLYGONS) == usual).mean() > 0.999
 
 

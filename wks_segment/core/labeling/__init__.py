@@ -1,1 +1,1 @@
-"""From a fitted model to labels: smooth borders, named regions, left and right."""
+"""Labels of a pose by a fitted model: smooth borders, named regions, left and right."""

@@ -1,239 +1,262 @@
-"""A learned mixture at work on poses: posteriors, clean labels, connected regions, left and right.
+"""Labels a pose with a fitted model: posteriors, clean labels, connected regions, left and right.
 
-What is found out is kept with the poses (`Workpiece.memo`), by what it was made from: another number of segments, or
-another smoothness, makes anew only what depends on it.
+Intermediate results are kept with the poses (`Workpiece.results`) together with their inputs: another number of
+segments, or another smoothness, computes only the results that depend on it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
-from ..geometry.graph_cut import REGION_CREASE, REGION_WIDTH
+from ..geometry.graph_cut import REGION_CREASE, REGION_WIDTH, CutStyle
 from ..learning.candidates import of_one_mesh
 from ..learning.gaussian_mixture import GaussianMixture
 from ..learning.merge_tree import Grouping
 from ..learning.model_selection import MIN_SHARE
+from ..learning.standardizer import Standardizer
 from ..mesh.adjacency import FaceAdjacency
 from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
-from ..poses.pose_cache import Workpiece
-from .polygons import PosedMesh
-from .region_atlas import FIELDS, RegionAtlas, Regions, Traits, mean_traits, side_field, sides_of_parts
+from ..poses.pose_cache import Kind, ResultKey, Workpiece
+from ..progress import Progress
+from .polygons import Cleaning, PolygonMesh
+from .region_atlas import RegionAtlas
+from .sides import side_field, sides_of_regions
+from .traits import FIELDS, Regions, Traits, mean_traits
 
-CLEANED = 0.7
-"""Share of the time that finding regions takes, the rest is telling which is which."""
-STRAY = 0.15
-"""A connected part of a segment under this share of its largest one is a crumb, too: a band between two others where
-the signature passes by a third one's, as head between back and tail."""
+LABELS_SHARE = 0.7
+"""Share of the time of finding regions that their labels take; the rest is recognizing the regions."""
+STRAY_SHARE = 0.15
+"""A connected region with less than this share of the area of the largest one of its segment is too small as well. Such
+regions are bands between two other segments where the signature passes through the values of a third, such as a band of
+"head" between back and tail."""
 VOTERS = 5
-"""Poses of a mesh that say which of its parts are left and right; more would not say it more surely."""
-MOST_NUMBERS = 3_000_000
-"""Posteriors of components at vertices that are kept at most; above that only those of segments are computed."""
+"""Number of poses of a mesh that vote on its sides; more poses hardly change the result."""
+MOST_POSTERIORS = 3_000_000
+"""Maximum number of posteriors of components that are kept with a pose; above it, only posteriors of segments are
+computed, to save memory."""
 
 
 @dataclass(frozen=True)
 class Labeler:
-    """A learned mixture, how its components make segments, and how smooth these are to be.
+    """A fitted model with its current settings, which labels poses.
 
     Attributes
     ----------
     mixture : GaussianMixture
         With K components.
+    standardizer : Standardizer
+        From the signature of a pose to the space of the mixture.
     grouping : Grouping or None
         None: each component is a segment.
-    standardized
-        From the signature of a pose to what entered the mixture.
     n_segments : int
     length : float
-        Smoothing length in units of the square root of the area; 0: none.
+        Smoothing length in units of the square root of the area; 0: no smoothing.
     """
 
     mixture: GaussianMixture
+    standardizer: Standardizer
     grouping: Grouping | None
-    standardized: Callable[[FloatArray], FloatArray]
     n_segments: int
     length: float
 
-    def posteriors(self, work: Workpiece) -> FloatArray:
-        """(n', K) posteriors of the components at the vertices of a pose."""
-        return self.mixture.posteriors(self.standardized(work.pose.signature))
+    @property
+    def min_share(self) -> float:
+        """Default of the smallest share of the area that a region must have."""
+        return MIN_SHARE if self.length > 0 else 0.0
+
+    def posteriors(self, pose: Workpiece) -> FloatArray:
+        """(n', K) posteriors of the components at the vertices of the surface of a pose."""
+        return self.mixture.posteriors(self.standardizer.transform(pose.signature))
 
     def joined(self, posteriors: FloatArray, n_groups: int | None = None) -> FloatArray:
-        """(…, n_groups) sums of (…, K) posteriors over each group's components; over each segment's if not given."""
+        """(…, n_groups) sums of (…, K) posteriors over the components of each group; of each segment if not given."""
         if self.grouping is None:
             return posteriors
         n_groups = n_groups or self.n_segments
         return np.asarray(posteriors @ np.eye(n_groups, dtype=posteriors.dtype)[self.grouping.groups(n_groups)])
 
-    def smoothed(self, work: Workpiece, n_groups: int | None) -> FloatArray:
+    def smoothed(self, pose: Workpiece, n_groups: int | None) -> FloatArray:
         """(n', n_groups) smoothed posteriors of groups at the vertices of a pose; of components if None.
 
-        Those of components are kept: they are the same for every number of groups.
+        Posteriors of components are kept with the pose: they are the same for every number of groups.
         """
-
-        def smooth(posteriors: FloatArray) -> FloatArray:
-            return work.flows.over(self.length).smooth(posteriors) if self.length > 0 else posteriors
-
-        if not self._keeps(len(work.pose.signature)):
-            return smooth(self.joined(self.posteriors(work), n_groups))
-        raw = work.memo.get("posteriors", (self.mixture,), lambda: self.posteriors(work))
-        of_components = work.memo.get("smoothed", (self.mixture, self.length), lambda: smooth(raw))
-        return of_components if n_groups is None else self.joined(of_components, n_groups)
-
-    def _keeps(self, count: int) -> bool:
-        """Whether posteriors of components at so many places are kept."""
-        return count * len(self.mixture.weights) <= MOST_NUMBERS
-
-    @threadpool_limits.wrap(limits=1, user_api="blas")  # on arrays this small, threads wait for each other
-    def clean(
-        self,
-        works: Sequence[Workpiece],
-        polygons: Sequence[IntArray] | None,
-        least_share: float,
-        progress: Callable[[float], None] | None = None,
-        marked: IntArray | None = None,
-        n_groups: int | None = None,
-    ) -> tuple[IntArray, FaceAdjacency]:
-        """Segments, or with `n_groups` what regions are parts of; of polygons (None: triangles). See `PosedMesh`."""
-        # What poses of one mesh have in common is kept with the first.
-        kind, memo = ("faces" if polygons is None else "polygons", len(works)), works[0].memo
-        posed = memo.get(
-            ("posed", *kind), (*(work.pose for work in works), *(polygons or ())), lambda: PosedMesh(works, polygons)
+        if not self._keeps(len(pose.signature)):
+            return self._smooth(pose, self.joined(self.posteriors(pose), n_groups))
+        raw = pose.results.get(ResultKey(Kind.POSTERIORS), (self.mixture,), lambda: self.posteriors(pose))
+        smooth = pose.results.get(
+            ResultKey(Kind.SMOOTH_POSTERIORS), (self.mixture, self.length), lambda: self._smooth(pose, raw)
         )
-        joined = n_groups or self.n_segments
-        if self._keeps(max(posed.n_polygons, *(len(work.pose.signature) for work in works))):
-            of_components = memo.get(
-                ("mean", *kind),
-                (posed, self.mixture, self.length),
-                lambda: posed.mean(works, lambda work: self.smoothed(work, None), progress),
-            )
-            posteriors = self.joined(of_components, joined)
-        else:
-            posteriors = posed.mean(works, lambda work: self.smoothed(work, joined), progress)
-        if n_groups is None:
-            how = {"least_of_largest": STRAY if least_share > 0 else 0.0}
-        else:
-            how = {"crease": REGION_CREASE, "width": REGION_WIDTH}
-        return posed.labeled(works, posteriors, self.length, least_share, marked, **how)
+        return smooth if n_groups is None else self.joined(smooth, n_groups)
 
-    @threadpool_limits.wrap(limits=1, user_api="blas")  # as above
-    def named_regions(self, atlas: RegionAtlas, work: Workpiece, least_share: float) -> IntArray:
-        """(m,) region of each face, numbered as in the atlas, and on from there."""
-        regions = self._regions(atlas.n_groups, [work], least_share)
-        return regions.numbered(atlas.named(self._traits(regions, work, 1)), len(atlas.side))
+    def segments(
+        self,
+        poses: Sequence[Workpiece],
+        polygons: Sequence[IntArray] | None,
+        min_share: float,
+        progress: Progress,
+        marked: IntArray | None = None,
+    ) -> tuple[IntArray, FaceAdjacency]:
+        """Clean segments of the polygons of a mesh, and the neighbors among polygons; see `PolygonMesh.labels`.
 
-    @threadpool_limits.wrap(limits=1, user_api="blas")  # as above
-    def atlas(
-        self, n_groups: int, works: Sequence[Workpiece], rest: TriangleMesh | None, tick: Callable[[float], None]
-    ) -> RegionAtlas:
-        """The connected regions of so many groups on learned poses, and which are left and right.
-
-        ValueError if `rest` has other faces than the first pose.
+        With `polygons` None, each triangle is a polygon.
         """
-        first = works[0].surface.original
-        if rest is not None and not np.array_equal(rest.faces, first.faces):
-            raise ValueError("rest has other faces than the first pose: pass the same mesh, in its rest position")
-        found: list[Regions] = []
-        traits: list[Traits] = []
-        for alike in _together(works):
+        mesh = self._polygon_mesh(poses, polygons)
+        posteriors = self._mean_posteriors(mesh, poses, polygons is not None, self.n_segments, progress)
+        cleaning = Cleaning(CutStyle(self.length), min_share, STRAY_SHARE if min_share > 0 else 0.0)
+        return mesh.labels(poses, posteriors, cleaning, marked)
 
-            def cleaning(share: float, begun: int = len(traits), count: int = len(alike)) -> None:
-                tick((begun + CLEANED * share * count) / len(works))
+    def named_regions(self, atlas: RegionAtlas, pose: Workpiece, min_share: float) -> IntArray:
+        """(m,) region of each face, numbered as in the atlas; regions that were not learned have higher numbers."""
+        regions = self._regions(atlas.n_groups, [pose], min_share, Progress())
+        return regions.numbered(atlas.named(self._traits(regions, pose, 1)), len(atlas.side))
 
-            regions = self._regions(n_groups, alike, self.least_share, cleaning)
-            found.append(regions)
-            begun = len(traits)
-            for i, work in enumerate(alike):
-                tick((begun + CLEANED * len(alike) + (1 - CLEANED) * i) / len(works))
-                traits.append(self._traits(regions, work, len(alike)))
-        centers = found[0].centers(first if rest is None else rest)
-        return RegionAtlas.learned(n_groups, traits, centers, alike=len(found) == 1)
+    def atlases(
+        self,
+        poses: Sequence[Workpiece],
+        rest: TriangleMesh | None,
+        progress: Progress,
+        known: Sequence[RegionAtlas] = (),
+    ) -> tuple[RegionAtlas, RegionAtlas]:
+        """Atlas of the connected regions of wholes, and atlas of those of segments, of the learned poses.
 
-    @threadpool_limits.wrap(limits=1, user_api="blas")  # as above
+        A whole may lie on both sides, as forelegs together with the chest between them; so left and right are told by
+        segments. If these are the wholes, both atlases are the same.
+
+        Parameters
+        ----------
+        poses
+            The learned poses.
+        rest : TriangleMesh or None
+            See `PoseSegmentation.fit`.
+        progress : Progress
+        known
+            Atlases that were learned already.
+
+        Raises
+        ------
+        ValueError
+            If `rest` has other faces than the first pose.
+        """
+        assert self.grouping is not None
+        numbers = self.grouping.number_of_wholes(self.n_segments), self.n_segments
+        atlases = {atlas.n_groups: atlas for atlas in known}
+        for n_groups, step in progress.each(sorted(set(numbers) - atlases.keys())):
+            atlases[n_groups] = self._atlas(n_groups, poses, rest, step)
+        wholes, segments = (atlases[n_groups] for n_groups in numbers)
+        return wholes, segments
+
     def sides(
         self,
         atlas: RegionAtlas,
-        works: Sequence[Workpiece],
+        poses: Sequence[Workpiece],
         polygons: Sequence[IntArray],
         labels: IntArray,
-        progress: Callable[[float], None] | None = None,
+        progress: Progress,
     ) -> IntArray:
-        """(p,) side of each polygon, given the segments: see `PoseSegmentation.polygon_sides`."""
-        voters = sorted(set(np.linspace(0, len(works) - 1, VOTERS).round().astype(int).tolist()))
-        given: list[IntArray] = []
+        """(p,) side of each polygon, given the segments; see `PoseSegmentation.polygon_sides`."""
+        voters = sorted(set(np.linspace(0, len(poses) - 1, VOTERS).round().astype(int).tolist()))
+        votes: list[IntArray] = []
+        for together, step in _steps([poses[i] for i in voters], progress):
+            regions = self._regions(atlas.n_groups, together, self.min_share, step.part(0.0, LABELS_SHARE))
+            names = atlas.named(mean_traits([self._traits(regions, pose, len(together)) for pose in together]))
+            side_of_face = atlas.sides_of(regions.numbered(names, len(atlas.side)))
+            for pose, _ in step.part(LABELS_SHARE, 1.0).each(together):
+                field = _side_field(pose, regions, atlas, side_of_face)
+                votes.append(_sides_in_pose(pose, field, polygons[voters[len(votes)]], labels))
+        # A tie between left and neither is neither.
+        return np.trunc(np.median(votes, axis=0)).astype(np.int64)
 
-        def tick(done: float) -> None:
-            if progress:
-                progress(done / len(voters))
+    def _atlas(
+        self, n_groups: int, poses: Sequence[Workpiece], rest: TriangleMesh | None, progress: Progress
+    ) -> RegionAtlas:
+        first = poses[0].surface.original
+        if rest is not None and not np.array_equal(rest.faces, first.faces):
+            raise ValueError("rest has other faces than the first pose: pass the same mesh, in its rest position")
+        of_meshes: list[Regions] = []
+        traits: list[Traits] = []
+        for together, step in _steps(poses, progress):
+            regions = self._regions(n_groups, together, self.min_share, step.part(0.0, LABELS_SHARE))
+            of_meshes.append(regions)
+            for pose, _ in step.part(LABELS_SHARE, 1.0).each(together):
+                traits.append(self._traits(regions, pose, len(together)))
+        centers = of_meshes[0].centers(first if rest is None else rest)
+        return RegionAtlas.learned(n_groups, traits, centers, alike=len(of_meshes) == 1)
 
-        for alike in _together([works[i] for i in voters]):
-            begun = len(given)
+    def _regions(self, n_groups: int, poses: Sequence[Workpiece], min_share: float, progress: Progress) -> Regions:
+        """Connected regions of groups on a mesh, found in several poses of it together."""
 
-            def cleaning(share: float, begun: int = begun, count: int = len(alike)) -> None:
-                tick(begun + CLEANED * share * count)
+        def compute() -> Regions:
+            mesh = self._polygon_mesh(poses, None)
+            posteriors = self._mean_posteriors(mesh, poses, False, n_groups, progress)
+            cleaning = Cleaning(CutStyle(self.length, REGION_CREASE, REGION_WIDTH), min_share)
+            labels, neighbors = mesh.labels(poses, posteriors, cleaning)
+            return Regions.of(labels, neighbors, poses[0].surface.original)
 
-            regions = self._regions(atlas.n_groups, alike, self.least_share, cleaning)
-            names = atlas.named(mean_traits([self._traits(regions, work, len(alike)) for work in alike]))
-            of_faces = atlas.sides_of(regions.numbered(names, len(atlas.side)))
-            for i, work in enumerate(alike):
-                polygon_of = polygons[voters[len(given)]]
-                field = _kept_side_field(work, regions, atlas, of_faces)
-                given.append(_sides_seen_in(work, field, polygon_of, labels))
-                tick(begun + CLEANED * len(alike) + (1 - CLEANED) * (i + 1))
-        # Half left and half neither is neither.
-        return np.trunc(np.median(given, axis=0)).astype(np.int64)
+        inputs = self.mixture, self.grouping, n_groups, self.length, min_share, *(pose.pose for pose in poses)
+        return poses[0].results.get(ResultKey(Kind.REGIONS, len(poses)), inputs, compute)
 
-    @property
-    def least_share(self) -> float:
-        """Smallest part where nothing is said of it, as a share of the area."""
-        return MIN_SHARE if self.length > 0 else 0.0
+    def _polygon_mesh(self, poses: Sequence[Workpiece], polygons: Sequence[IntArray] | None) -> PolygonMesh:
+        # Results about all poses of a mesh are kept with the first one.
+        key = ResultKey(Kind.POLYGON_MESH, len(poses), polygons is not None)
+        inputs = (*(pose.pose for pose in poses), *(polygons or ()))
+        return poses[0].results.get(key, inputs, lambda: PolygonMesh(poses, polygons))
 
-    def _regions(
-        self,
-        n_groups: int,
-        works: Sequence[Workpiece],
-        least_share: float,
-        progress: Callable[[float], None] | None = None,
-    ) -> Regions:
-        """Connected regions of so many groups on a mesh, agreed on by poses of it."""
+    def _mean_posteriors(
+        self, mesh: PolygonMesh, poses: Sequence[Workpiece], of_polygons: bool, n_groups: int, progress: Progress
+    ) -> FloatArray:
+        """(p, n_groups) smoothed posteriors of polygons, mean over the poses."""
+        if not self._keeps(max(mesh.n_polygons, *(len(pose.signature) for pose in poses))):
+            return mesh.mean(poses, lambda pose: self.smoothed(pose, n_groups), progress)
+        of_components = poses[0].results.get(
+            ResultKey(Kind.MEAN_POSTERIORS, len(poses), of_polygons),
+            (mesh, self.mixture, self.length),
+            lambda: mesh.mean(poses, lambda pose: self.smoothed(pose, None), progress),
+        )
+        return self.joined(of_components, n_groups)
 
-        def found() -> Regions:
-            labels, neighbors = self.clean(works, None, least_share, progress, n_groups=n_groups)
-            return Regions.of(labels, neighbors, works[0].surface.original)
+    def _keeps(self, count: int) -> bool:
+        """Whether posteriors of components at this many places are kept."""
+        return count * len(self.mixture.weights) <= MOST_POSTERIORS
 
-        poses = (work.pose for work in works)
-        made_from = self.mixture, self.grouping, n_groups, self.length, least_share, *poses
-        return works[0].memo.get(("regions", len(works)), made_from, found)
+    def _smooth(self, pose: Workpiece, posteriors: FloatArray) -> FloatArray:
+        return pose.flows.over(self.length).smooth(posteriors) if self.length > 0 else posteriors
 
-    def _traits(self, regions: Regions, work: Workpiece, n_poses: int) -> Traits:
-        """What tells regions, found in so many poses together, apart in one of them."""
-        fields = work.memo.get("fields", (self.mixture,), lambda: self._fields(work))
-        return work.memo.get(("traits", n_poses), (regions, fields), lambda: regions.traits(work, fields))
+    def _traits(self, regions: Regions, pose: Workpiece, n_poses: int) -> Traits:
+        """Traits, in one pose, of regions that were found in `n_poses` poses together."""
+        fields = pose.results.get(ResultKey(Kind.FIELDS), (self.mixture,), lambda: self._fields(pose))
+        key = ResultKey(Kind.TRAITS, n_poses)
+        return pose.results.get(key, (regions, fields), lambda: regions.traits(pose, fields))
 
-    def _fields(self, work: Workpiece) -> FloatArray:
-        """(n', FIELDS) the signature along the axes on which the components lie farthest apart."""
+    def _fields(self, pose: Workpiece) -> FloatArray:
+        """(n', FIELDS) signature along the axes on which the components lie farthest apart."""
         means, weights = self.mixture.means, self.mixture.weights
         axes = np.linalg.eigh((means * weights[:, None]).T @ means)[1][:, ::-1][:, :FIELDS]
-        # Which way an axis points is up to the library; a model must mean the same everywhere.
+        # The library chooses the signs of the axes; a model must mean the same on every machine.
         axes *= np.sign(axes[np.abs(axes).argmax(axis=0), np.arange(axes.shape[1])])
-        fields = self.standardized(work.pose.signature) @ axes
+        fields = self.standardizer.transform(pose.signature) @ axes
         return np.pad(fields, ((0, 0), (0, FIELDS - axes.shape[1])))
 
 
-def _together(works: Sequence[Workpiece]) -> list[Sequence[Workpiece]]:
-    """The poses whose regions are the same ones: all that have the same faces, or each alone."""
-    return [works] if of_one_mesh([work.pose for work in works]) else [[work] for work in works]
+def _steps(poses: Sequence[Workpiece], progress: Progress) -> list[tuple[Sequence[Workpiece], Progress]]:
+    """Poses whose regions are found together, all with the same faces or each by itself, and the progress of each."""
+    if of_one_mesh([pose.pose for pose in poses]):
+        return [(poses, progress)]
+    return [([pose], progress.part(i / len(poses), (i + 1) / len(poses))) for i, pose in enumerate(poses)]
 
 
-def _kept_side_field(work: Workpiece, regions: Regions, atlas: RegionAtlas, side: IntArray) -> FloatArray:
-    """(m,) how far left or right each face of a pose is, given the side of each face's region."""
-    return work.memo.get("sides", (regions, atlas), lambda: side_field(work, side))
+def _side_field(pose: Workpiece, regions: Regions, atlas: RegionAtlas, side: IntArray) -> FloatArray:
+    """(m,) how far left or right each face of a pose is, given the side of the region of each face."""
+    return pose.results.get(ResultKey(Kind.SIDE_FIELD), (regions, atlas), lambda: side_field(pose, side))
 
 
-def _sides_seen_in(work: Workpiece, field: FloatArray, polygon_of: IntArray, labels: IntArray) -> IntArray:
-    """(p,) side of each polygon as one pose has it."""
-    neighbors = work.memo.get("polygons", (polygon_of,), lambda: work.neighbors.between_polygons(polygon_of))
-    return sides_of_parts(work.surface, field, polygon_of, labels, MIN_SHARE, neighbors)
+def _sides_in_pose(pose: Workpiece, field: FloatArray, polygon_of: IntArray, labels: IntArray) -> IntArray:
+    """(p,) side of each polygon in one pose."""
+    neighbors = pose.results.get(
+        ResultKey(Kind.POLYGON_NEIGHBORS, polygons=True),
+        (polygon_of,),
+        lambda: pose.neighbors.between_polygons(polygon_of),
+    )
+    return sides_of_regions(pose.surface, field, polygon_of, labels, MIN_SHARE, neighbors)

@@ -1,4 +1,4 @@
-"""From posteriors at vertices to clean labels of faces or polygons: smooth borders along creases, no crumbs."""
+"""From posteriors at vertices to labels of polygons: short borders along creases, and no small regions."""
 
 from __future__ import annotations
 
@@ -8,26 +8,47 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix, diags
 
-from ..geometry.graph_cut import CUT_CREASE, CUT_WIDTH, CutStyle, cut_borders
+from ..geometry.graph_cut import CutStyle, cut_borders
 from ..mesh.adjacency import FaceAdjacency, FaceGraph, merge_small_regions
 from ..mesh.surface import indicator
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ..poses.pose_cache import Workpiece
+from ..progress import Progress
 
-MARKED = 0.1
-"""What a border at a marked edge costs, as a share of what it would."""
+MARKED_COST = 0.1
+"""Cost of a border along a marked edge, as a fraction of its cost elsewhere: low enough that a border moves to a marked
+edge within reach, and high enough that marked edges alone make no border."""
 
 
-class PosedMesh:
-    """Where the p polygons of a mesh lie, in one or several poses: all that labels need but the posteriors.
+@dataclass(frozen=True)
+class Cleaning:
+    """How labels are cleaned.
 
-    It does not hold the poses, which may hold it.
+    Attributes
+    ----------
+    cut : CutStyle
+        How borders are smoothed; with length 0, each polygon gets its likeliest label.
+    min_share : float
+        Connected regions with less than this share of the area join a neighbor.
+    min_share_of_largest : float
+        Connected regions with less than this share of the largest one with their label join a neighbor.
+    """
+
+    cut: CutStyle
+    min_share: float
+    min_share_of_largest: float = 0.0
+
+
+class PolygonMesh:
+    """The p polygons of a mesh in one or several poses: everything that labels need except the posteriors.
+
+    It does not refer to the poses, because it is kept in the cache of one of them.
 
     Parameters
     ----------
     poses
     polygons
-        For each pose, the polygon of each triangle, -1 for none; None: each triangle is one.
+        For each pose, the polygon of each triangle, -1 for none; None: each triangle is a polygon.
 
     Attributes
     ----------
@@ -42,20 +63,20 @@ class PosedMesh:
             polygons = [np.arange(pose.surface.original.n_faces) for pose in poses]
         n_polygons = 1 + max(int(polygon_of.max()) for polygon_of in polygons)
         self.areas, times_seen = np.zeros(n_polygons), np.zeros(n_polygons)
-        layouts = []
+        in_poses = []
         for pose, polygon_of in zip(poses, polygons, strict=True):
-            layout = _Layout.of(pose, polygon_of, n_polygons)
-            self.areas += layout.areas
-            times_seen += layout.seen
-            layouts.append(layout)
-        self._layouts, self._times_seen = layouts, times_seen
-        # Of one mesh the borders are the same in every pose; modifiers may hide some of them in one.
-        most = max(range(len(layouts)), key=lambda i: len(layouts[i].neighbors.pairs))
-        self._most, layout = most, layouts[most]
-        others = sum(other.centers for other in layouts) / np.maximum(times_seen, 1)[:, None]
-        self._centers = np.where(layout.seen[:, None], layout.centers, others)
+            in_pose = _PolygonsInPose.of(pose, polygon_of, n_polygons)
+            self.areas += in_pose.areas
+            times_seen += in_pose.seen
+            in_poses.append(in_pose)
+        self._in_poses, self._times_seen = in_poses, times_seen
+        # Borders of one mesh are the same in every pose, but modifiers may hide some of them in a pose.
+        self._fullest = max(range(len(in_poses)), key=lambda i: len(in_poses[i].neighbors.pairs))
+        fullest = in_poses[self._fullest]
+        mean_centers = sum(in_pose.centers for in_pose in in_poses) / np.maximum(times_seen, 1)[:, None]
+        self._centers = np.where(fullest.seen[:, None], fullest.centers, mean_centers)
         self.areas /= np.maximum(times_seen, 1)
-        self.neighbors = layout.neighbors
+        self.neighbors = fullest.neighbors
 
     @property
     def n_polygons(self) -> int:
@@ -66,81 +87,68 @@ class PosedMesh:
         self,
         poses: Sequence[Workpiece],
         posteriors_on: Callable[[Workpiece], FloatArray],
-        progress: Callable[[float], None] | None = None,
+        progress: Progress,
     ) -> FloatArray:
         """(p, K) mean over triangles and poses of (n', K) posteriors at the vertices of each pose.
 
-        `progress` is called after each pose with the share that is done, 0 to 1.
+        Progress is reported after each pose.
         """
         total: FloatArray = np.zeros(())
-        for i, (pose, layout) in enumerate(zip(poses, self._layouts, strict=True)):
-            total = total + layout.mean @ pose.surface.to_faces(posteriors_on(pose))
-            if progress:
-                progress((i + 1) / len(poses))
+        for i, (pose, in_pose) in enumerate(zip(poses, self._in_poses, strict=True)):
+            total = total + in_pose.mean @ pose.surface.to_faces(posteriors_on(pose))
+            progress((i + 1) / len(poses))
         return total / np.maximum(self._times_seen, 1)[:, None]
 
-    def labeled(
+    def labels(
         self,
         poses: Sequence[Workpiece],
         posteriors: FloatArray,
-        length: float,
-        least_share: float,
+        cleaning: Cleaning,
         marked: IntArray | None = None,
-        crease: float = CUT_CREASE,
-        width: float = CUT_WIDTH,
-        least_of_largest: float = 0.0,
     ) -> tuple[IntArray, FaceAdjacency]:
-        """Label the polygons, and clean the labels.
+        """Clean labels of the polygons.
 
         Parameters
         ----------
         poses
-            As they were given.
+            The same as those that this was made from.
         posteriors : (p, K) array
-            Smoothed over `length`.
-        length : float
-            Smoothing length in units of the square root of the area; 0: the likeliest label of each polygon.
-        least_share : float
-            Connected parts under this share of the area join a neighbor.
+            Smoothed over the length of the cut.
+        cleaning : Cleaning
         marked : (q, 2) int array, optional
             Neighboring polygons between which a border is welcome.
-        crease, width : float
-            How much creases draw borders, and over how many smoothing lengths; see `CutStyle`.
-        least_of_largest : float
-            Connected parts under this share of the largest one with their label do, too.
 
         Returns
         -------
-        (p,) int array of labels, -1 for a polygon without a triangle, and the neighbors among polygons, with loose
-        pieces tied to what adopted them.
+        (p,) int array of labels, -1 for a polygon without a triangle, and the neighbors among polygons, including
+        those of islands that took the label of their surroundings.
         """
         labels = np.where(self._times_seen > 0, posteriors.argmax(axis=1), -1)
         graph = FaceGraph(self.areas, self._centers, self.neighbors)
-        if length > 0:
-            style = CutStyle(length, crease, width)
-            layout = self._layouts[self._most]
-            weights = style.border_weights(poses[self._most].curvature[layout.across])
+        if cleaning.cut.length > 0:
+            across = self._in_poses[self._fullest].across
+            weights = cleaning.cut.border_weights(poses[self._fullest].curvature[across])
             if marked is not None:
-                weights = np.where(self.neighbors.among(marked), MARKED * weights, weights)
-            labels = cut_borders(posteriors, graph, weights, style, labels)
-        return merge_small_regions(labels, graph, least_share, least_of_largest)
+                weights = np.where(self.neighbors.among(marked), MARKED_COST * weights, weights)
+            labels = cut_borders(posteriors, graph, weights, cleaning.cut, labels)
+        return merge_small_regions(labels, graph, cleaning.min_share, cleaning.min_share_of_largest)
 
 
 @dataclass(frozen=True)
-class _Layout:
-    """Where the p polygons of a mesh lie in one pose, of area 1.
+class _PolygonsInPose:
+    """The p polygons of a mesh in one pose, scaled to area 1.
 
     Attributes
     ----------
     seen : (p,) bool array
-        Whether any triangle is of the polygon.
+        Whether the polygon has a triangle.
     areas : (p,) array
     centers : (p, 3) array
         0 where not seen.
     mean : (p, m) sparse array
-        From triangles to polygons, by area.
+        Averages values of triangles over each polygon, by area.
     across : (b,) bool array
-        Which of the neighbors among the triangles are of different polygons.
+        Whether each pair of neighboring triangles belongs to different polygons.
     neighbors : FaceAdjacency
         Of the polygons.
     """
@@ -153,11 +161,11 @@ class _Layout:
     neighbors: FaceAdjacency
 
     @classmethod
-    def of(cls, pose: Workpiece, polygon_of: IntArray, n_polygons: int) -> _Layout:
-        """Given the polygon of each triangle."""
+    def of(cls, pose: Workpiece, polygon_of: IntArray, n_polygons: int) -> _PolygonsInPose:
+        """Polygons of a pose, given the polygon of each triangle."""
         original = pose.surface.original
         sum_over = indicator(np.where(polygon_of < 0, n_polygons, polygon_of), n_polygons + 1)[:n_polygons]
-        # A triangle without area still speaks, if very softly, or its polygon would have no label.
+        # A triangle without area has a tiny weight, or a polygon of such triangles would have no label.
         weight = original.face_areas / original.area + np.finfo(float).eps
         total = sum_over @ weight
         seen = np.asarray(total > 0)

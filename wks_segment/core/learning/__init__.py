@@ -1,1 +1,1 @@
-"""From described poses to segments: Gaussian mixtures, the merging of their components, the choice among candidates."""
+"""Learning of segments from described poses: Gaussian mixtures, their choice, and the joining of components."""

@@ -1,10 +1,12 @@
-"""Mixtures laid out on the poses that they were learned from: all of learning that does not ask for the number of
-segments. It takes most of the time that is left when signatures are known, and so it is kept beside them."""
+"""Candidate mixtures, evaluated on their training poses.
+
+A candidate does not depend on the number of segments. Computing the candidates takes most of the time of a fit whose
+signatures are cached, so candidates are cached as well.
+"""
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, get_args
 
@@ -15,134 +17,141 @@ from ..geometry.heat_flow import HeatFlow
 from ..mesh.adjacency import FaceAdjacency
 from ..mesh.triangle_mesh import FloatArray, IntArray
 from ..poses.pose_signature import PoseSignature
+from ..poses.signature_cache import content_key
+from ..progress import Progress
 from .gaussian_mixture import CovarianceType, GaussianMixture, drawn_evenly
-from .merge_tree import Contacts, Ground
+from .merge_tree import Contacts, PoseGeometry
+from .standardizer import Standardizer
 
-VERSION = 1
-"""To be raised whenever the same poses and settings give another layout than before."""
-COMPARED = 4_000
-"""Faces on which the labels of the learned poses are compared."""
-LAID = 0.8
-"""Share of the time of a pose when it is laid out, see `Ground`; the rest is to lay the mixtures on it."""
+CANDIDATES_VERSION = 1
+"""To be raised whenever the same poses and settings give other candidates than before."""
+COMPARED_FACES = 4_000
+"""Number of faces on which the labels of the training poses are compared: drawn evenly by area, so that the error of a
+share is below 1 %."""
+GEOMETRY_SHARE = 0.8
+"""Share of the time of a pose that its `PoseGeometry` takes; the rest is evaluating the mixtures on it."""
 SMOOTHING_LENGTH = 0.03
 """Width of the smoothing along borders at smoothness 1, in units of the square root of the area."""
 _TYPES: tuple[CovarianceType, ...] = get_args(CovarianceType)
+_MIXTURE_ARRAYS = ("weights", "means", "covariances")
+_CONTACT_ARRAYS = tuple(Contacts.__dataclass_fields__)
 
 
 @dataclass(frozen=True)
-class Layout:
-    """Mixtures that may do, on the poses that they were learned from.
+class Candidate:
+    """A mixture and its components on the training poses.
 
     Attributes
     ----------
-    mixtures
-        In the space of standardized signatures.
-    grounds
-        Of each pose.
-    contacts
-        Of each mixture's components, mean over the poses.
+    mixture : GaussianMixture
+        Of standardized signatures.
+    contacts : Contacts
+        Mean over the poses.
     likeliest
-        For each mixture and pose, (m,) the component of each face.
+        For each pose, (m,) likeliest component of each face.
     samples
-        For each mixture and pose, (f, K) smoothed posteriors of some faces, each of which stands for as much of the
-        area; None unless the poses are several of one mesh.
+        For each pose, (f, K) smoothed posteriors of some faces with equal shares of the area; empty unless there are
+        several poses of one mesh.
     """
 
-    mixtures: Sequence[GaussianMixture]
-    grounds: Sequence[Ground]
-    contacts: Sequence[Contacts]
-    likeliest: Sequence[Sequence[IntArray]]
-    samples: Sequence[Sequence[FloatArray]] | None
+    mixture: GaussianMixture
+    contacts: Contacts
+    likeliest: Sequence[IntArray]
+    samples: Sequence[FloatArray]
+
+
+@dataclass(frozen=True)
+class CandidateSet:
+    """Candidate mixtures, and the geometry of the training poses that they are compared on.
+
+    Attributes
+    ----------
+    geometries
+        Of each pose.
+    candidates
+        At least one.
+    """
+
+    geometries: Sequence[PoseGeometry]
+    candidates: Sequence[Candidate]
+
+    @property
+    def one_mesh(self) -> bool:
+        """Whether the training poses are several poses of one mesh."""
+        return len(self.candidates[0].samples) > 0
 
     @classmethod
     def of(
         cls,
         poses: Sequence[PoseSignature],
         mixtures: Sequence[GaussianMixture],
-        standardized: Callable[[FloatArray], FloatArray],
-        tick: Callable[[float], None],
-    ) -> Layout:
-        """Lay mixtures on poses; `standardized` leads from the signature of a pose to what enters the mixture."""
+        standardizer: Standardizer,
+        progress: Progress,
+    ) -> CandidateSet:
+        """Evaluate mixtures of standardized signatures on poses."""
         contacts: list[list[Contacts]] = [[] for _ in mixtures]
         likeliest: list[list[IntArray]] = [[] for _ in mixtures]
         samples: list[list[FloatArray]] = [[] for _ in mixtures]
-        grounds = []
+        geometries = []
         first = poses[0].surface.original
-        drawn = drawn_evenly(first.face_areas / first.area, COMPARED) if of_one_mesh(poses) else None
-        for i, pose in enumerate(poses):
-
-            def of_pose(share: float, begun: int = i) -> None:
-                tick((begun + share) / len(poses))
-
-            of_pose(0.0)
-            ground = Ground.of(pose.surface, lambda share, of_pose=of_pose: of_pose(LAID * share))  # type: ignore[misc]
-            on_pose = standardized(pose.signature)
-            grounds.append(ground)
+        drawn = drawn_evenly(first.face_areas / first.area, COMPARED_FACES) if of_one_mesh(poses) else None
+        for pose, step in progress.each(poses):
+            geometry = PoseGeometry.of(pose.surface, step.part(0.0, GEOMETRY_SHARE))
+            geometries.append(geometry)
+            standardized = standardizer.transform(pose.signature)
             flow = HeatFlow(pose.surface.mesh, SMOOTHING_LENGTH)
-            for j, mixture in enumerate(mixtures):
-                of_pose(LAID + (1 - LAID) * j / len(mixtures))
-                of_faces = pose.surface.to_faces(flow.smooth(mixture.posteriors(on_pose)))
-                contacts[j].append(Contacts.on(ground, of_faces))
-                likeliest[j].append(of_faces.argmax(axis=1))
+            for j, (mixture, _) in enumerate(step.part(GEOMETRY_SHARE, 1.0).each(mixtures)):
+                posteriors = pose.surface.to_faces(flow.smooth(mixture.posteriors(standardized)))
+                contacts[j].append(Contacts.on(geometry, posteriors))
+                likeliest[j].append(posteriors.argmax(axis=1))
                 if drawn is not None:
-                    samples[j].append(of_faces[drawn])
-        means = [Contacts.mean(found) for found in contacts]
-        if drawn is None:
-            return cls(mixtures, grounds, means, likeliest, None)
-        means = [mean.with_changes(np.stack(kept)) for mean, kept in zip(means, samples, strict=True)]
-        return cls(mixtures, grounds, means, likeliest, samples)
+                    samples[j].append(posteriors[drawn])
+        means = [Contacts.mean(of_poses) for of_poses in contacts]
+        if drawn is not None:
+            means = [mean.with_changes(np.stack(of_poses)) for mean, of_poses in zip(means, samples, strict=True)]
+        return cls(geometries, [Candidate(*parts) for parts in zip(mixtures, means, likeliest, samples, strict=True)])
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """What a file keeps; see `of_arrays`."""
-        found: dict[str, NDArray[Any]] = {"compared": np.array(self.samples is not None)}
-        for i, ground in enumerate(self.grounds):
-            found |= {f"lengths_{i}": ground.lengths, f"part_{i}": ground.part}
-        for j, mixture in enumerate(self.mixtures):
-            found[f"type_{j}"] = np.array(_TYPES.index(mixture.covariance_type))
-            found |= {f"{name}_{j}": getattr(mixture, name) for name in ("weights", "means", "covariances")}
-            found |= {f"{name}_{j}": getattr(self.contacts[j], name) for name in Contacts.__dataclass_fields__}
-            for i in range(len(self.grounds)):
-                found[f"likeliest_{j}_{i}"] = self.likeliest[j][i].astype(np.uint16)
-                if self.samples is not None:
-                    found[f"samples_{j}_{i}"] = self.samples[j][i]
-        return found
+        """Arrays by name, to be cached; `of_arrays` reads them."""
+        arrays: dict[str, NDArray[Any]] = {"compared": np.array(self.one_mesh)}
+        for i, geometry in enumerate(self.geometries):
+            arrays |= {f"lengths_{i}": geometry.lengths, f"part_{i}": geometry.cuts}
+        for j, candidate in enumerate(self.candidates):
+            arrays[f"type_{j}"] = np.array(_TYPES.index(candidate.mixture.covariance_type))
+            arrays |= {f"{name}_{j}": getattr(candidate.mixture, name) for name in _MIXTURE_ARRAYS}
+            arrays |= {f"{name}_{j}": getattr(candidate.contacts, name) for name in _CONTACT_ARRAYS}
+            arrays |= {f"likeliest_{j}_{i}": labels.astype(np.uint16) for i, labels in enumerate(candidate.likeliest)}
+            arrays |= {f"samples_{j}_{i}": posteriors for i, posteriors in enumerate(candidate.samples)}
+        return arrays
 
     @classmethod
-    def of_arrays(cls, poses: Sequence[PoseSignature], arrays: Mapping[str, NDArray[Any]]) -> Layout:
-        """From what `arrays` gave, and the poses that it was made from; KeyError or ValueError if it is not that."""
-        grounds, every = [], range(len(poses))
+    def of_arrays(cls, poses: Sequence[PoseSignature], arrays: Mapping[str, NDArray[Any]]) -> CandidateSet:
+        """The candidates in arrays that `arrays` made for the same poses; KeyError or ValueError if there are none."""
+        geometries, pose_range = [], range(len(poses))
         for i, pose in enumerate(poses):
             adjacency = FaceAdjacency.of(pose.surface.welded_faces, pose.surface.original.vertices)
-            grounds.append(Ground(pose.surface, adjacency, arrays[f"lengths_{i}"], arrays[f"part_{i}"]))
-        numbers = range(sum(name.startswith("type_") for name in arrays))
-        return cls(
-            [
-                GaussianMixture(
-                    _TYPES[int(arrays[f"type_{j}"])],
-                    *(arrays[f"{name}_{j}"] for name in ("weights", "means", "covariances")),
+            geometries.append(PoseGeometry(pose.surface, adjacency, arrays[f"lengths_{i}"], arrays[f"part_{i}"]))
+        compared = arrays["compared"]
+        candidates = []
+        for j in range(sum(name.startswith("type_") for name in arrays)):
+            covariance_type = _TYPES[int(arrays[f"type_{j}"])]
+            candidates.append(
+                Candidate(
+                    GaussianMixture(covariance_type, *(arrays[f"{name}_{j}"] for name in _MIXTURE_ARRAYS)),
+                    Contacts(*(arrays[f"{name}_{j}"] for name in _CONTACT_ARRAYS)),
+                    [arrays[f"likeliest_{j}_{i}"].astype(np.int64) for i in pose_range],
+                    [arrays[f"samples_{j}_{i}"] for i in pose_range] if compared else [],
                 )
-                for j in numbers
-            ],
-            grounds,
-            [Contacts(*(arrays[f"{name}_{j}"] for name in Contacts.__dataclass_fields__)) for j in numbers],
-            [[arrays[f"likeliest_{j}_{i}"].astype(np.int64) for i in every] for j in numbers],
-            [[arrays[f"samples_{j}_{i}"] for i in every] for j in numbers] if arrays["compared"] else None,
-        )
+            )
+        return cls(geometries, candidates)
 
 
-def layout_key(poses: Sequence[PoseSignature], settings: Sequence[Any]) -> str:
-    """A name for the layout on poses with settings: another one if anything that enters it differs."""
-    digest = hashlib.blake2b(digest_size=20)
-    digest.update(repr(("layout", VERSION, len(poses), *settings)).encode())
-    for pose in poses:
-        for name, array in pose.arrays().items():
-            # Shapes keep apart what would be the same row of bytes.
-            digest.update(repr((name, array.shape, array.dtype.str)).encode())
-            digest.update(np.ascontiguousarray(array).data)
-    return digest.hexdigest()
+def candidates_key(poses: Sequence[PoseSignature], settings: Sequence[Any]) -> str:
+    """Cache key of the candidates for poses and settings: another key if any of them differs in any bit."""
+    return content_key(("layout", CANDIDATES_VERSION, len(poses), *settings), *(pose.arrays() for pose in poses))
 
 
 def of_one_mesh(poses: Sequence[PoseSignature]) -> bool:
-    """Whether several poses have the same faces."""
+    """Whether these are several poses with the same faces."""
     faces = [pose.surface.original.faces for pose in poses]
     return len(poses) > 1 and all(np.array_equal(faces[0], other) for other in faces[1:])

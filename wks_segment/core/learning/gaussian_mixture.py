@@ -1,13 +1,14 @@
-"""A Gaussian mixture over weighted samples, fitted by expectation–maximization that cannot collapse.
+"""Gaussian mixture of weighted samples, fitted by expectation–maximization (EM) that cannot collapse.
 
-scikit-learn's mixture takes no sample weights and has no covariance that all components share and that is diagonal,
-which is the paper's remedy against over-fitting; hence our own. Its k-means starts it.
+Why not scikit-learn's `GaussianMixture`: it takes no sample weights, so a densely meshed hand would count more than a
+coarse back; and it lacks the covariance that is diagonal and shared by all components ("shared"), the paper's remedy
+against over-fitting. With diagonal covariances, EM here also runs in single precision, in half the time. K-means, which
+starts EM, is scikit-learn's.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -16,41 +17,51 @@ from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 from sklearn.cluster import KMeans
 from sklearn.exceptions import ConvergenceWarning
-from threadpoolctl import threadpool_limits
 
 from ..mesh.triangle_mesh import FloatArray, IntArray
+from ..message import Message
+from ..progress import Progress, ShareFunction
+from ..threads import one_thread
 
 CovarianceType = Literal["shared", "diag", "full", "tied", "spherical"]
 
 VARIANCE_FLOOR = 1e-3
-"""Added to every variance, as a fraction of the samples' own mean variance."""
+"""Added to every variance, as a fraction of the mean variance of the samples: keeps a component from shrinking to one
+point, where its likelihood would be infinite."""
 MAX_ITERATIONS = 200
-TOLERANCE = 1e-3
+"""Maximum number of EM rounds, in case that `EM_TOLERANCE` does not end them."""
+EM_TOLERANCE = 1e-3
 """EM ends when the mean log-likelihood rises by less than this in one round."""
 SEEDS = range(6)
-"""EM is started by k-means from each of these, on a sketch of the samples; the likeliest mixture is refined on all of
-them. The same in every fit: what comes out is no matter of luck."""
-SAME = 1e-3
-"""Starts whose log-likelihoods differ by less than this share ended in the same mixture."""
-SKETCHED = 0.3
-"""Share of the work that the starts are."""
-SKETCH = 4_000
-"""Samples in the sketch."""
-ROWS = 65_536
-"""Samples in one block of the likelihood."""
+"""Seeds of the k-means starts. They are the same in every fit, so that the result is not a matter of luck; the best of
+them are refined on all samples."""
+SAME_LIKELIHOOD = 1e-3
+"""Starts whose log-likelihoods differ by less than this fraction ended in the same mixture."""
+STARTS_SHARE = 0.3
+"""Share of the time that the starts take; the rest is refining."""
+SKETCH_SIZE = 4_000
+"""Number of samples that the starts see: enough to choose among them, at a fifth of the time of all samples."""
+BLOCK_ROWS = 65_536
+"""Number of samples whose likelihood is computed at once, which bounds the memory."""
 
 
 class TooFewSamplesError(ValueError):
-    """There are fewer different samples than components; `distinct` says how many."""
+    """There are fewer distinct samples than components; `distinct` is their number."""
 
     def __init__(self, n_components: int, distinct: int) -> None:
-        super().__init__(f"{n_components} components are too many: the samples have only {distinct} distinct values")
+        super().__init__(
+            Message(
+                "{count} components are too many: the samples have only {distinct} distinct values",
+                count=n_components,
+                distinct=distinct,
+            )
+        )
         self.distinct = distinct
 
 
 @dataclass(frozen=True)
 class GaussianMixture:
-    """K Gaussians with weights.
+    """Mixture of K Gaussians with weights.
 
     Attributes
     ----------
@@ -58,7 +69,7 @@ class GaussianMixture:
         "shared" (one diagonal for all), "diag", "spherical" (one number a component), "tied" (one full matrix for
         all), "full".
     weights : (K,) array
-        Sum to 1.
+        Weights of the components; they sum to 1.
     means : (K, d) array
     covariances : array
         (d,) for "shared", (K, d) for "diag", (K,) for "spherical", (d, d) for "tied", (K, d, d) for "full".
@@ -70,48 +81,57 @@ class GaussianMixture:
     covariances: FloatArray
 
     def log_densities(self, samples: FloatArray) -> FloatArray:
-        """(n, K) log of weight times density of each component at (n, d) samples."""
+        """(n, K) logarithm of weight times density of each component at (n, d) samples."""
         blocks = [
-            _log_gaussians(samples[start : start + ROWS], None, self.means, self.covariances, self.covariance_type)
-            for start in range(0, max(len(samples), 1), ROWS)
+            _log_gaussians(
+                samples[start : start + BLOCK_ROWS], None, self.means, self.covariances, self.covariance_type
+            )
+            for start in range(0, max(len(samples), 1), BLOCK_ROWS)
         ]
         return np.concatenate(blocks) + np.log(self.weights)
 
     def posteriors(self, samples: FloatArray) -> FloatArray:
         """(n, K) probability of each component given each of the (n, d) samples; rows sum to 1."""
         logs = self.log_densities(samples)
-        # Divided by their sum, not by e to its logarithm: of a large one the digits behind the point are lost.
+        # Division by the sum keeps more digits than subtracting its logarithm would, which can be large.
         shares = np.exp(logs - logs.max(axis=1, keepdims=True))
         return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 
     def log_likelihoods(self, samples: FloatArray) -> FloatArray:
-        """(n,) log density of the whole mixture at (n, d) samples."""
+        """(n,) log-density of the whole mixture at (n, d) samples."""
         return np.asarray(logsumexp(self.log_densities(samples), axis=1))
 
 
+@one_thread  # the same digits on every machine, and on samples this few more threads cost more than they gain
 def fit_mixture(
     samples: FloatArray,
     sample_weights: FloatArray,
     n_components: int,
     covariance_type: CovarianceType = "shared",
     random_state: int | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: ShareFunction | Progress | None = None,
 ) -> GaussianMixture:
-    """The likeliest of the mixtures that `fit_mixtures` finds."""
-    return fit_mixtures(samples, sample_weights, n_components, covariance_type, random_state, 1, progress)[0]
+    """Fit a mixture to weighted samples: the likeliest one that `fit_mixtures` finds.
+
+        mixture = fit_mixture(samples, np.ones(len(samples)), 3, "diag")
+        labels = mixture.posteriors(samples).argmax(axis=1)
+
+    Parameters are those of `fit_mixtures`; `progress` may also be a function of the share that is done.
+    """
+    step = Progress.of_share(progress)
+    return fit_mixtures(samples, sample_weights, n_components, covariance_type, random_state, 1, step)[0]
 
 
-@threadpool_limits.wrap(limits=1)  # on samples this few, threads cost more than they gain
 def fit_mixtures(
     samples: FloatArray,
     sample_weights: FloatArray,
     n_components: int,
-    covariance_type: CovarianceType = "shared",
-    random_state: int | None = None,
-    keep: int = 1,
-    progress: Callable[[float], None] | None = None,
+    covariance_type: CovarianceType,
+    random_state: int | None,
+    keep: int,
+    progress: Progress,
 ) -> list[GaussianMixture]:
-    """Fit mixtures to weighted samples by expectation–maximization, started by k-means.
+    """Fit mixtures to weighted samples by expectation–maximization from several starts by k-means.
 
     Parameters
     ----------
@@ -123,77 +143,78 @@ def fit_mixtures(
         depend on the start.
     covariance_type
         See `GaussianMixture`.
-    random_state : int, optional
+    random_state : int or None
         None: six starts, the same six in every fit, on a sketch that is spread evenly over the samples. A number: one
         start with this seed, as in the paper.
     keep : int
-        Mixtures to return at most: the likeliest first, refined on all samples. Of starts that ended in the same
-        mixture only one counts.
-    progress : callable, optional
-        Called with the share of the work that is done, 0 to 1, in every round. An error that it raises ends the work.
+        Maximum number of mixtures to return: the likeliest starts, refined on all samples. Starts that ended in the
+        same mixture count once.
+    progress : Progress
+        Reported in every round of EM.
+
+    Returns
+    -------
+    list of GaussianMixture, the one whose start was likeliest first.
 
     Raises
     ------
     TooFewSamplesError
-        If there are fewer different samples than components.
+        If there are fewer distinct samples than components.
     ValueError
         If the covariance type is unknown.
     """
     if covariance_type not in get_args(CovarianceType):
-        raise ValueError(f"covariance_type must be one of {get_args(CovarianceType)}, not {covariance_type!r}")
-    shares = sample_weights / sample_weights.sum()
-    seeds = SEEDS if random_state is None else [random_state]
-    sketch, sketch_shares = samples, shares
-    if len(samples) > SKETCH:
-        sketch = samples[drawn_evenly(shares, SKETCH)]
-        sketch_shares = np.full(SKETCH, 1 / SKETCH)
-    floor = variance_floor(samples, shares)
-
-    def tick(share: float) -> None:
-        if progress:
-            progress(share)
-
-    candidates = []
-    for i, seed in enumerate(seeds):
-        tick(SKETCHED * i / len(seeds))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ConvergenceWarning)  # too few different samples: an error below
-            kmeans = KMeans(n_components, n_init=1, random_state=seed)
-            start = kmeans.fit_predict(sketch, sample_weight=sketch_shares)
-        if len(np.unique(start)) < n_components:
-            raise TooFewSamplesError(n_components, len(np.unique(start)))
-        candidates.append(
-            _maximize_likelihood(
-                sketch, sketch_shares, np.eye(n_components)[start], covariance_type, floor,
-                lambda share, begun=i: tick(SKETCHED * (begun + share) / len(seeds)),  # type: ignore[misc]
+        raise ValueError(
+            Message(
+                "covariance_type must be one of {choices}, not {value!r}",
+                choices=", ".join(get_args(CovarianceType)),
+                value=covariance_type,
             )
-        )  # fmt: skip
-    candidates.sort(key=lambda candidate: -candidate[1])
-    different = [
-        candidate
-        for i, candidate in enumerate(candidates)
-        if i == 0 or candidates[i - 1][1] - candidate[1] > SAME * abs(candidate[1])
+        )
+    shares = sample_weights / sample_weights.sum()
+    sketch, sketch_shares = samples, shares
+    if len(samples) > SKETCH_SIZE:
+        sketch = samples[drawn_evenly(shares, SKETCH_SIZE)]
+        sketch_shares = np.full(SKETCH_SIZE, 1 / SKETCH_SIZE)
+    floor = variance_floor(samples, shares)
+    starts = []
+    for seed, step in progress.part(0.0, STARTS_SHARE).each(list(SEEDS) if random_state is None else [random_state]):
+        responsibilities = _k_means(sketch, sketch_shares, n_components, seed)
+        starts.append(_maximize_likelihood(sketch, sketch_shares, responsibilities, covariance_type, floor, step))
+    starts.sort(key=lambda start: -start[1])
+    distinct = [
+        mixture
+        for i, (mixture, likelihood) in enumerate(starts)
+        if i == 0 or starts[i - 1][1] - likelihood > SAME_LIKELIHOOD * abs(likelihood)
     ][:keep]
     refined = []
-    for i, (candidate, _) in enumerate(different):
-        mixture, _ = _maximize_likelihood(
-            samples, shares, candidate.posteriors(samples), covariance_type, floor,
-            lambda share, begun=i: tick(SKETCHED + (1 - SKETCHED) * (begun + share) / len(different)),  # type: ignore[misc]
-        )  # fmt: skip
+    for start, step in progress.part(STARTS_SHARE, 1.0).each(distinct):
+        mixture, _ = _maximize_likelihood(samples, shares, start.posteriors(samples), covariance_type, floor, step)
         refined.append(_in_order(mixture))
-    tick(1.0)
     return refined
 
 
+def _k_means(samples: FloatArray, shares: FloatArray, n_clusters: int, seed: int) -> FloatArray:
+    """(n, K) responsibilities, 0 or 1, by k-means; TooFewSamplesError if there are too few distinct samples."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)  # about too few distinct samples: the error below says it
+        cluster = KMeans(n_clusters, n_init=1, random_state=seed).fit_predict(samples, sample_weight=shares)
+    distinct = len(np.unique(cluster))
+    if distinct < n_clusters:
+        raise TooFewSamplesError(n_clusters, distinct)
+    return np.asarray(np.eye(n_clusters)[cluster])
+
+
 def variance_floor(samples: FloatArray, shares: FloatArray) -> float:
-    """What is added to every variance."""
+    """The number that is added to every variance, for (n, d) samples with (n,) shares that sum to 1."""
     return VARIANCE_FLOOR * float(shares @ ((samples - shares @ samples) ** 2).mean(axis=1))
 
 
 def drawn_evenly(shares: FloatArray, count: int) -> IntArray:
-    """(count,) samples that stand for all of them: at equal steps along their (n,) shares, which sum to 1.
+    """(count,) indices of samples that represent all: at equal steps along their (n,) shares, which sum to 1.
 
-    A heavy sample comes several times. Neighbors in memory are neighbors on a surface, so that no place is left out.
+    A sample with a large share is drawn several times. Samples that are neighbors in memory are neighbors on a surface,
+    so that no place is left out.
     """
     steps = (np.arange(count) + 0.5) / count
     return np.asarray(np.minimum(np.searchsorted(np.cumsum(shares), steps), len(shares) - 1))
@@ -205,20 +226,20 @@ def _maximize_likelihood(
     start: FloatArray,
     covariance_type: CovarianceType,
     floor: float,
-    tick: Callable[[float], None],
+    progress: Progress,
 ) -> tuple[GaussianMixture, float]:
-    """EM from (n, K) responsibilities; the mixture and its mean log-likelihood."""
+    """Mixture by EM from (n, K) responsibilities, and its mean log-likelihood."""
     previous = -np.inf
     squares = None
     if covariance_type not in ("full", "tied"):
-        # What both steps need of the samples if covariances are diagonal, once. They come standardized, so that sums of
-        # squares lose no digits, also not in single precision, which takes half the time.
+        # With diagonal covariances both steps need only the squares of the samples, which are computed once. Samples
+        # are standardized, so that sums of squares keep their digits in single precision, which takes half the time.
         samples = samples.astype(np.float32)
         squares = samples**2
     responsibilities = start.astype(samples.dtype)
     shares = shares.astype(samples.dtype)
     for i in range(MAX_ITERATIONS):
-        tick(i / MAX_ITERATIONS)
+        progress(i / MAX_ITERATIONS)
         mixture = maximize(samples, squares, responsibilities * shares[:, None], covariance_type, floor)
         logs = _log_gaussians(samples, squares, mixture.means, mixture.covariances, covariance_type)
         logs += np.log(mixture.weights).astype(logs.dtype)
@@ -227,7 +248,7 @@ def _maximize_likelihood(
         total = responsibilities.sum(axis=1, keepdims=True)
         responsibilities /= total
         current = float(shares.astype(np.float64) @ (highest + np.log(total))[:, 0].astype(np.float64))
-        if current - previous < TOLERANCE:
+        if current - previous < EM_TOLERANCE:
             break
         previous = current
     return mixture, current
@@ -240,8 +261,11 @@ def maximize(
     covariance_type: CovarianceType,
     floor: float,
 ) -> GaussianMixture:
-    """M-step for (n, K) masses that sum to 1, with `floor` added to each variance."""
-    # An empty component keeps a vanishing weight instead of dividing by zero.
+    """M-step of EM: mixture of (n, d) samples with (n, K) responsibilities times shares, which sum to 1.
+
+    `squares` are the (n, d) squares of the samples, None with full matrices; `floor` is added to each variance.
+    """
+    # An empty component keeps a vanishing weight, against a division by zero.
     weights = masses.sum(axis=0, dtype=np.float64) + 10 * np.finfo(float).tiny ** 0.5
     means = (masses.T @ samples).astype(np.float64) / weights[:, None]
     covariances: FloatArray
@@ -250,7 +274,7 @@ def maximize(
         covariances = scatter.sum(axis=0) if covariance_type == "tied" else scatter / weights[:, None, None]
         covariances = covariances + floor * np.eye(samples.shape[1])
     elif covariance_type == "shared":
-        # Summed over components first: one row of squares instead of one a component.
+        # The sum over components comes first: it needs one row of squares instead of one for each component.
         covariances = np.maximum((masses.sum(axis=1) @ squares).astype(np.float64) - weights @ means**2, 0) + floor
     else:
         covariances = np.maximum((masses.T @ squares).astype(np.float64) / weights[:, None] - means**2, 0) + floor
@@ -260,6 +284,7 @@ def maximize(
 
 
 def _scatter(centered: FloatArray, mass: FloatArray) -> FloatArray:
+    """(d, d) weighted sum of outer products of centered samples."""
     return (centered * mass[:, None]).T @ centered
 
 
@@ -270,7 +295,7 @@ def _log_gaussians(
     covariances: FloatArray,
     covariance_type: CovarianceType,
 ) -> FloatArray:
-    """(n, K) log densities, without the weights; `squares` of samples that are centered, if they are at hand."""
+    """(n, K) log-densities without the weights; `squares` are those of centered samples, None to compute them."""
     n_components, dimension = means.shape
     if covariance_type in ("full", "tied"):
         matrices = np.broadcast_to(covariances, (n_components, dimension, dimension))
@@ -284,10 +309,10 @@ def _log_gaussians(
             axis=1,
         )
     else:
-        # (1, d) if components share it: what only depends on the sample is then computed once for all.
+        # (1, d) if components share it: terms that depend on the sample alone are then computed once for all.
         variances = covariances[:, None] if covariance_type == "spherical" else np.atleast_2d(covariances)
         half_log_determinants = np.log(np.broadcast_to(variances, (len(variances), dimension))).sum(axis=1) / 2
-        # Σ (x − μ)² / v, multiplied out so that it is two matrix products. Centered first, against cancellation.
+        # Σ (x − μ)² / v, expanded to two matrix products; samples are centered first, against cancellation.
         center = means.mean(axis=0)
         x, mu = (samples - center, means - center) if squares is None else (samples, means)
         squared = x**2 if squares is None else squares
@@ -300,6 +325,7 @@ def _log_gaussians(
 
 
 def _in_order(mixture: GaussianMixture) -> GaussianMixture:
+    """The mixture with its components in the order of the mean of their means, largest first."""
     order = np.argsort(-mixture.means.mean(axis=1), kind="stable")
     per_component = mixture.covariance_type in ("diag", "spherical", "full")
     covariances = mixture.covariances[order] if per_component else mixture.covariances

@@ -1,4 +1,4 @@
-"""How well a mixture explains a shape, and how well it would explain what it was learned from, had it not been."""
+"""Log-likelihood of a shape, and leave-one-out log-likelihood of the training poses."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ import numpy as np
 
 from ..mesh.triangle_mesh import FloatArray, IntArray
 from .gaussian_mixture import GaussianMixture, maximize, variance_floor
+from .standardizer import Standardizer
+from .training_samples import TrainingSamples
 
 LEFT_OUT = 0.1
-"""Share of the area, the least likely, that does not count: what a pose hides or glues together, as a hand on a thigh,
-is unlike anything that was learned, and would outweigh all else."""
+"""Share of the area, the least likely, that does not count in `likely_mean`: places that a pose hides or glues
+together, such as a hand on a thigh, are unlike all training poses and would outweigh everything else."""
 
 
 def likely_mean(log_likelihoods: FloatArray, shares: FloatArray) -> float:
@@ -19,13 +21,50 @@ def likely_mean(log_likelihoods: FloatArray, shares: FloatArray) -> float:
     return float(counted @ log_likelihoods[order] / counted.sum())
 
 
+def comparable_score(
+    standardizer: Standardizer, log_likelihoods: FloatArray, signature: FloatArray, shares: FloatArray
+) -> float:
+    """Score of a shape that models with any parameters share; see `PoseSegmentation.comparable_score`.
+
+    Parameters
+    ----------
+    standardizer : Standardizer
+        Of the model.
+    log_likelihoods : (n,) array
+        Of the standardized signature under the mixture.
+    signature : (n, d) array
+    shares : (n,) array
+        Shares of the area, which sum to 1.
+    """
+    densities = standardizer.comparable_densities(log_likelihoods, signature)
+    return likely_mean(densities, shares) / standardizer.n_energies
+
+
+def usual_scores(mixture: GaussianMixture, training: TrainingSamples) -> FloatArray:
+    """(poses,) comparable score that each training pose would have, had it not been learned.
+
+    For a single pose it is the score that it has.
+    """
+    samples = training.standardized
+    if training.n_poses > 1:
+        likelihoods = left_out_likelihoods(mixture, samples, training.shares, training.pose)
+    else:
+        likelihoods = mixture.log_likelihoods(samples)
+    scores = []
+    for pose in np.unique(training.pose):
+        chosen = training.pose == pose
+        shares = training.shares[chosen] / training.shares[chosen].sum()
+        scores.append(comparable_score(training.standardizer, likelihoods[chosen], training.signature[chosen], shares))
+    return np.array(scores)
+
+
 def left_out_likelihoods(
     mixture: GaussianMixture, samples: FloatArray, shares: FloatArray, group: IntArray
 ) -> FloatArray:
-    """How likely samples are to a mixture that was learned without their group.
+    """Log-likelihoods of samples under a mixture that was learned without their group.
 
-    One step of EM from the mixture, without the group, stands for learning anew: components stay what they are of, but
-    know the group's samples no more.
+    One step of EM from the given mixture, without the group, stands for learning again: each component keeps its
+    meaning, but no longer knows the samples of the group.
 
     Parameters
     ----------
@@ -33,9 +72,9 @@ def left_out_likelihoods(
         Fitted to all samples.
     samples : (n, d) array
     shares : (n,) array
-        Positive, sum to 1.
+        Weights of the samples: positive, sum to 1.
     group : (n,) int array
-        The group of each sample, at least two.
+        Group of each sample, of at least two groups.
 
     Returns
     -------
@@ -44,10 +83,10 @@ def left_out_likelihoods(
     floor = variance_floor(samples, shares)
     squares = None if mixture.covariance_type in ("full", "tied") else samples**2
     masses = mixture.posteriors(samples) * shares[:, None]
-    found = np.empty(len(samples))
+    likelihoods = np.empty(len(samples))
     for i in np.unique(group):
-        mine = group == i
-        others = masses * ~mine[:, None]
-        without = maximize(samples, squares, others / others.sum(), mixture.covariance_type, floor)
-        found[mine] = without.log_likelihoods(samples[mine])
-    return found
+        inside = group == i
+        remaining = masses * ~inside[:, None]
+        without = maximize(samples, squares, remaining / remaining.sum(), mixture.covariance_type, floor)
+        likelihoods[inside] = without.log_likelihoods(samples[inside])
+    return likelihoods

@@ -1,204 +1,216 @@
-"""A mixture over several poses, and which of its components make a segment."""
+"""Choice of a mixture over several poses, and of the components that make each segment."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from ..mesh.adjacency import connected_regions
-from ..mesh.triangle_mesh import FloatArray, IntArray
+from ..message import Message, message_of
 from ..poses.pose_signature import PoseSignature
 from ..poses.signature_cache import Cache
-from .candidates import Layout, layout_key
+from ..progress import Progress
+from .candidates import Candidate, CandidateSet, candidates_key
 from .gaussian_mixture import CovarianceType, GaussianMixture, TooFewSamplesError, fit_mixtures
-from .merge_tree import Ground, Grouping
+from .merge_tree import Grouping
+from .parameters import NSegments, effective, least_segments
+from .training_samples import TrainingSamples
 
-AUTO: tuple[CovarianceType, ...] = ("shared", "diag")
-"""Covariances that `covariance_type="auto"` tries on several poses; of one alone it takes the first."""
-CANDIDATES = 4
-"""Mixtures of each covariance whose groups are compared."""
+AUTO_TYPES: tuple[CovarianceType, ...] = ("shared", "diag")
+"""Covariance types that `covariance_type="auto"` tries on several poses; on one pose it takes the first."""
+CANDIDATES_PER_TYPE = 4
+"""Number of mixtures of each covariance type that are compared."""
 EARNED = 0.8
-"""Another covariance than the first is taken if its labels disagree less than this share as much between the poses."""
-REGROUPED = 5
-"""Rounds of joining at most, until no segment is lost as crumbs."""
-COMPONENTS, PER_SEGMENT, MOST_MORE = 24, 3, 64
-"""Components of the mixture: at least so many, and so many for each segment, but at most so many more than segments."""
+"""A covariance type other than the first is chosen if its labels disagree between the poses by less than this fraction
+of the disagreement of the first: more parameters must earn their place."""
+REGROUPING_ROUNDS = 5
+"""Maximum number of times that components are joined again, each time with the scattered segments
+first; more rounds could go on without an end."""
+LEAST_COMPONENTS, PER_SEGMENT, MOST_MORE = 24, 3, 64
+"""The mixture has `PER_SEGMENT` components for each segment, but at least `LEAST_COMPONENTS`, and at most `MOST_MORE`
+more than segments: with fewer, borders that people would draw are missing; with more, a fit takes longer."""
+FITTING_SHARE = 3 / 7
+"""Share of the time of learning a mixture that fitting the candidates takes; the rest is evaluating them."""
 MIN_SHARE = 0.005
-"""Smallest part, as a share of the area."""
+"""Default share of the area that a connected region must have to keep its label."""
 
 
 @dataclass(frozen=True)
-class Candidates:
-    """Mixtures that may do, on the poses that they were learned from.
+class CandidatePlan:
+    """Which mixtures to fit: with more components than segments, which are joined afterwards.
 
     Attributes
     ----------
-    layout : Layout
-    number
-        Of segments, given a grouping.
-    """
-
-    layout: Layout
-    number: Callable[[Grouping], int]
-
-    @threadpool_limits.wrap(limits=1, user_api="blas")  # on arrays this small, threads wait for each other
-    def best(self) -> tuple[GaussianMixture, Grouping]:
-        """A mixture, and its grouping.
-
-        On poses of one mesh the mixture whose labels agree best between the poses; on several meshes the one whose
-        regions are most like the parts that people would cut each into; on one alone the one that is surest.
-        """
-        layout = self.layout
-        groupings = [Grouping.of(mean) for mean in layout.contacts]
-        if len(layout.grounds) > 1 and layout.samples is None:
-            # Compared is what comes out: bodies differ more in what is crumbs than poses do.
-            groupings = [self._without_scattered(i, grouping) for i, grouping in enumerate(groupings)]
-            losses = [
-                self._unlike_parts(grouping, layout.grounds, of_faces)
-                for grouping, of_faces in zip(groupings, layout.likeliest, strict=True)
-            ]
-            best = int(np.argmin(losses))
-            return layout.mixtures[best], groupings[best]
-        if layout.samples is None:
-            losses = [-float(grouping.certainties[self.number(grouping) - 1]) for grouping in groupings]
-        else:
-            # What has more to fit must earn it.
-            first_type = layout.mixtures[0].covariance_type
-            losses = [
-                self._disagreement(grouping, kept) / (1 if mixture.covariance_type == first_type else EARNED)
-                for grouping, kept, mixture in zip(groupings, layout.samples, layout.mixtures, strict=True)
-            ]
-        best = int(np.argmin(losses))
-        return layout.mixtures[best], self._without_scattered(best, groupings[best])
-
-    def _unlike_parts(self, grouping: Grouping, grounds: Sequence[Ground], components: Sequence[IntArray]) -> float:
-        """How unlike the parts of the poses the regions are, given the likeliest component of each face in each."""
-        group = grouping.groups(grouping.number_of_wholes(self.number(grouping)))
-        poses = zip(grounds, components, strict=True)
-        return float(np.mean([ground.unlike_parts(group[of_faces]) for ground, of_faces in poses]))
-
-    def _disagreement(self, grouping: Grouping, posteriors: Sequence[FloatArray]) -> float:
-        """Share of faces and pairs of poses with different labels, given posteriors of some faces in each pose."""
-        number = self.number(grouping)
-        labels = np.stack([(each @ np.eye(number)[grouping.groups(number)]).argmax(axis=1) for each in posteriors])
-        return float((labels[:, None] != labels).mean())
-
-    def _without_scattered(self, index: int, grouping: Grouping) -> Grouping:
-        """Joined anew until no segment is crumbs everywhere: first what is, to what it lies on.
-
-        Of the mixture with that index. On poses of one mesh a segment must be whole in half of them; of several meshes
-        one may have a part that no other has.
-        """
-        layout = self.layout
-        contacts, components = layout.contacts[index], layout.likeliest[index]
-        least = 1 if layout.samples is None else len(layout.grounds) / 2
-        scattered = np.zeros(len(contacts.areas), dtype=bool)
-        for _ in range(REGROUPED):
-            number = self.number(grouping)
-            group, seen = grouping.groups(number), np.zeros(number)
-            for ground, of_faces in zip(layout.grounds, components, strict=True):
-                labels, original = group[of_faces], ground.surface.original
-                region = connected_regions(labels, ground.adjacency)
-                large = np.bincount(region, original.face_areas) >= MIN_SHARE * original.area
-                seen[np.unique(labels[large[region]])] += 1
-            lasting = seen >= least
-            if lasting.all():
-                break
-            scattered |= ~lasting[group]
-            grouping = Grouping.of(contacts, scattered)
-        return grouping
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Which mixtures are fitted to poses: those of more components than the segments that are wanted, to be joined.
-
-    Attributes
-    ----------
-    poses
-    samples, shares
-        See `fit_mixtures`.
-    wanted : int
-        Segments at least.
+    training : TrainingSamples
+    n_segments : int or "auto"
+        As for `PoseSegmentation`. With "auto", "tied" and "full" have a few components, else as many as segments: with
+        more, such a mixture would take minutes to fit and overfit each pose.
     covariance_types
-        Those to try.
-    open_number : bool
-        Whether the number of segments is left open: "tied" and "full" then have a few components, else as many as
-        segments. A finer mixture of these would take minutes, and learn every pose by heart.
+        The types to try.
     """
 
-    poses: Sequence[PoseSignature]
-    samples: FloatArray
-    shares: FloatArray
-    wanted: int
+    training: TrainingSamples
+    n_segments: NSegments
     covariance_types: Sequence[CovarianceType]
-    open_number: bool
 
-    def laid_out(
+    def candidates(
         self,
-        standardized: Callable[[FloatArray], FloatArray],
-        settings: Sequence[Any],
+        poses: Sequence[PoseSignature],
         cache: Cache | None,
-        mixing: Callable[[float], None],
-        grouping: Callable[[float], None],
-    ) -> Layout:
-        """The mixtures, on the poses; from the cache, if they are there for any number that has as many components.
+        fitting: Progress,
+        evaluating: Progress,
+    ) -> CandidateSet:
+        """Fit the mixtures and evaluate them on the training poses.
 
         Parameters
         ----------
-        standardized
-            See `Layout.of`.
-        settings
-            What it depends on.
-        cache
-            Asked first, and told in the end.
-        mixing, grouping
-            Called with the share of each of both steps that is done.
+        poses
+            The training poses.
+        cache : Cache or None
+            Searched first, for candidates of any number of segments that has as many components; new candidates are
+            added to it.
+        fitting, evaluating : Progress
+            Of the two steps.
         """
         key = ""
         if cache is not None:
-            counts = [self._n_components(each) for each in self.covariance_types]
-            key = layout_key(self.poses, [*settings, *zip(self.covariance_types, counts, strict=True)])
-            kept = cache.arrays(key)
+            counts = [self._n_components(kind) for kind in self.covariance_types]
+            settings = [self.training.standardizer.scaling, *zip(self.covariance_types, counts, strict=True)]
+            key = candidates_key(poses, settings)
             try:
-                return Layout.of_arrays(self.poses, kept or {})
-            except (KeyError, ValueError):  # there is none, or it is none
-                mixing(0.0)
-        mixtures = self._mixtures(mixing)
-        with threadpool_limits(1, "blas"):  # on arrays this small, threads wait for each other
-            layout = Layout.of(self.poses, mixtures, standardized, grouping)
-        # With fewer components than meant, these depend on the number of segments.
+                return CandidateSet.of_arrays(poses, cache.arrays(key) or {})
+            except (KeyError, ValueError):  # not cached, or damaged
+                fitting(0.0)
+        mixtures = self._mixtures(fitting)
+        candidates = CandidateSet.of(poses, mixtures, self.training.standardizer, evaluating)
+        # A mixture with fewer components than planned depends on the number of segments, which is not in the key.
         if cache is not None and all(
             len(mixture.weights) == self._n_components(mixture.covariance_type) for mixture in mixtures
         ):
             try:
-                cache.keep(key, layout.arrays())
+                cache.keep(key, candidates.arrays())
             except OSError as error:
-                warnings.warn(f"mixtures were not kept for the next time: {error}", stacklevel=2)
-        return layout
+                warnings.warn(
+                    Message("mixtures were not kept for the next time: {reason}", reason=message_of(error)),
+                    stacklevel=2,
+                )
+        return candidates
 
     def _n_components(self, covariance_type: CovarianceType) -> int:
+        wanted = least_segments(self.n_segments)
         if covariance_type in ("tied", "full"):
-            return max(self.wanted, COMPONENTS // PER_SEGMENT) if self.open_number else self.wanted
-        return min(max(COMPONENTS, PER_SEGMENT * self.wanted), self.wanted + MOST_MORE, len(self.samples))
+            return max(wanted, LEAST_COMPONENTS // PER_SEGMENT) if self.n_segments == "auto" else wanted
+        return min(max(LEAST_COMPONENTS, PER_SEGMENT * wanted), wanted + MOST_MORE, len(self.training.shares))
 
-    def _mixtures(self, tick: Callable[[float], None]) -> list[GaussianMixture]:
-        found = []
-        for i, each in enumerate(self.covariance_types):
-
-            def part(share: float, begun: int = i) -> None:
-                tick((begun + share) / len(self.covariance_types))
-
-            count = self._n_components(each)
+    def _mixtures(self, progress: Progress) -> list[GaussianMixture]:
+        samples, shares = self.training.standardized, self.training.shares
+        mixtures = []
+        for kind, step in progress.each(self.covariance_types):
+            count = self._n_components(kind)
             try:
-                found += fit_mixtures(self.samples, self.shares, count, each, None, CANDIDATES, part)
+                mixtures += fit_mixtures(samples, shares, count, kind, None, CANDIDATES_PER_TYPE, step)
             except TooFewSamplesError as error:
-                # A cube has three different vertices at most: no more components than that.
-                count = max(self.wanted, error.distinct)
-                found += fit_mixtures(self.samples, self.shares, count, each, None, CANDIDATES, part)
-        return found
+                # A cube has at most three distinct signatures, and so at most three components.
+                count = max(least_segments(self.n_segments), error.distinct)
+                mixtures += fit_mixtures(samples, shares, count, kind, None, CANDIDATES_PER_TYPE, step)
+        return mixtures
+
+
+def mixture_and_grouping(
+    parameters: Mapping[str, Any],
+    poses: Sequence[PoseSignature],
+    training: TrainingSamples,
+    cache: Cache | None,
+    progress: Progress,
+) -> tuple[GaussianMixture, Grouping | None]:
+    """The best candidate for the parameters of a model; with the paper's setting one mixture without a grouping."""
+    n_segments, covariance_type = parameters["n_segments"], effective(parameters, "covariance_type")
+    fitting, evaluating = progress.part(0.0, FITTING_SHARE, "mixture"), progress.part(FITTING_SHARE, 1.0, "parts")
+    if parameters["preset"] == "paper":
+        samples, shares = training.standardized, training.shares
+        return fit_mixtures(samples, shares, n_segments, covariance_type, parameters["random_state"], 1, fitting)[
+            0
+        ], None
+    types = AUTO_TYPES[: len(poses)] if covariance_type == "auto" else (covariance_type,)
+    candidates = CandidatePlan(training, n_segments, types).candidates(poses, cache, fitting, evaluating)
+    return best_candidate(candidates, n_segments)
+
+
+def best_candidate(candidates: CandidateSet, n_segments: NSegments) -> tuple[GaussianMixture, Grouping]:
+    """The best mixture for a number of segments, and its grouping.
+
+    Of several poses of one mesh it is the mixture whose labels agree best between the poses; of several meshes, the
+    mixture whose regions are most like reference cuts of each mesh by geometry; of a single pose, the mixture that is
+    most certain.
+    """
+    several = candidates.candidates
+    groupings = [Grouping.of(candidate.contacts) for candidate in several]
+    if len(candidates.geometries) > 1 and not candidates.one_mesh:
+        # Final regions are compared: meshes differ more than poses in which components are scattered.
+        groupings = [
+            _without_scattered(candidates, candidate, grouping, n_segments)
+            for candidate, grouping in zip(several, groupings, strict=True)
+        ]
+        losses = [
+            _rand_error(candidates, candidate, grouping, n_segments)
+            for candidate, grouping in zip(several, groupings, strict=True)
+        ]
+        best = int(np.argmin(losses))
+        return several[best].mixture, groupings[best]
+    if candidates.one_mesh:
+        first_type = several[0].mixture.covariance_type
+        losses = [
+            _disagreement(candidate, grouping, n_segments)
+            / (1 if candidate.mixture.covariance_type == first_type else EARNED)
+            for candidate, grouping in zip(several, groupings, strict=True)
+        ]
+    else:
+        losses = [-float(grouping.certainties[grouping.number_of(n_segments) - 1]) for grouping in groupings]
+    best = int(np.argmin(losses))
+    return several[best].mixture, _without_scattered(candidates, several[best], groupings[best], n_segments)
+
+
+def _rand_error(candidates: CandidateSet, candidate: Candidate, grouping: Grouping, n_segments: NSegments) -> float:
+    """Mean over the poses of the Rand-index error of the regions against the reference cuts."""
+    group = grouping.groups(grouping.number_of_wholes(grouping.number_of(n_segments)))
+    poses = zip(candidates.geometries, candidate.likeliest, strict=True)
+    return float(np.mean([geometry.rand_error(group[components]) for geometry, components in poses]))
+
+
+def _disagreement(candidate: Candidate, grouping: Grouping, n_segments: NSegments) -> float:
+    """Share of faces and pairs of poses with different labels."""
+    number = grouping.number_of(n_segments)
+    member = np.eye(number)[grouping.groups(number)]
+    labels = np.stack([(posteriors @ member).argmax(axis=1) for posteriors in candidate.samples])
+    return float((labels[:, None] != labels).mean())
+
+
+def _without_scattered(
+    candidates: CandidateSet, candidate: Candidate, grouping: Grouping, n_segments: NSegments
+) -> Grouping:
+    """Grouping in which no segment consists of small regions everywhere.
+
+    Components of such a segment are joined before all others, with what surrounds them, until none is left. In poses of
+    one mesh a segment needs a region of at least `MIN_SHARE` in half of the poses; in several meshes one is enough,
+    because a mesh may have a part that the others lack.
+    """
+    least = len(candidates.geometries) / 2 if candidates.one_mesh else 1
+    scattered = np.zeros(len(candidate.contacts.areas), dtype=bool)
+    for _ in range(REGROUPING_ROUNDS):
+        number = grouping.number_of(n_segments)
+        group, n_seen = grouping.groups(number), np.zeros(number)
+        for geometry, components in zip(candidates.geometries, candidate.likeliest, strict=True):
+            labels, original = group[components], geometry.surface.original
+            region = connected_regions(labels, geometry.adjacency)
+            large = np.bincount(region, original.face_areas) >= MIN_SHARE * original.area
+            n_seen[np.unique(labels[large[region]])] += 1
+        lasting = n_seen >= least
+        if lasting.all():
+            break
+        scattered |= ~lasting[group]
+        grouping = Grouping.of(candidate.contacts, scattered)
+    return grouping

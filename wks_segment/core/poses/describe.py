@@ -1,40 +1,43 @@
-"""From the mesh of a pose to its signature: what takes the time. Several poses side by side, cancellable."""
+"""From the mesh of a pose to its signature, which takes most of the time: several poses in parallel, cancelable."""
 
 from __future__ import annotations
 
 import os
 import threading
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
+from functools import partial
 from typing import Literal
-
-from threadpoolctl import threadpool_limits
 
 from ..mesh.surface import Connection, Pieces, connect, connect_alike, prepare_surface
 from ..mesh.triangle_mesh import TriangleMesh
+from ..message import Message, message_of
+from ..progress import Progress as _Progress
+from ..progress import ReportFunction, ShareFunction
 from ..spectral.eigenpairs import Accuracy, SpectrumError, memory_needed, seconds_needed
 from ..spectral.intrinsic_delaunay import Laplacian, better_triangles
 from ..spectral.memory import available_memory
 from ..spectral.signature import wave_kernel_signature_of
+from ..threads import one_blas_thread
+from .pose_cache import AnyPose, Workpiece
 from .pose_signature import PoseSignature
 from .signature_cache import SignatureCache, signature_key
 
-Progress = Callable[[str, float], None]
-"""Called with the stage and the fraction of the whole that is done, 0 to 1. An error that it raises ends the work."""
+Progress = ReportFunction
 
 VERTICES_PER_PAIR = 15
 """A surface is refined until it has this many vertices for each eigenpair: about six to the shortest wavelength."""
 MAX_WORKERS = 4
-"""Poses solved side by side at most: they share the memory's speed."""
+"""Maximum number of poses computed in parallel: more do not get faster, because they share the memory bandwidth."""
 PROGRESS_SECONDS = 0.1
-"""Time between two reports of progress."""
+"""Seconds between two reports of progress, and so the longest time until a job notices that it is canceled."""
 BESIDE_EIGENPAIRS = 1.5
-"""Time of the whole job in that of its eigenpairs, about."""
+"""Time of a whole job as a multiple of the time of its eigenpairs, about."""
 
 
 class PoseDescriber:
-    """Describes poses, by the parameters of the model that is one; see `PoseSegmentation`."""
+    """Base of models: describes poses by the parameters of the model; see `PoseSegmentation`."""
 
     n_eigenpairs: int
     n_energies: int
@@ -46,29 +49,32 @@ class PoseDescriber:
         raise NotImplementedError
 
     def _laplacian(self) -> Literal["auto"] | Laplacian:
-        """On which triangles."""
+        """The parameter `laplacian`, after the preset."""
         raise NotImplementedError
 
-    @threadpool_limits.wrap(limits=1, user_api="blas")  # so that one pose and one of several have the same bits
+    @one_blas_thread  # so that a pose has the same digits by itself and among several
     def describe(
         self,
         mesh: TriangleMesh,
         connection: Connection | None = None,
-        progress: Callable[[float], None] | None = None,
+        progress: ShareFunction | _Progress | None = None,
         cache: SignatureCache | None = None,
     ) -> PoseSignature:
-        """Compute the signature of one pose, to pass it to the other methods in the place of the mesh.
+        """Compute the signature of one pose; every other method accepts the result instead of the mesh.
+
+            pose = model.describe(mesh)
+            labels, regions = model.segment_faces(pose), model.segment_regions(pose)
 
         Parameters
         ----------
         mesh : TriangleMesh
             The pose.
         connection : Connection, optional
-            `connect(*poses)` of all poses of the same mesh, so that it is one surface in all of them.
+            `connect(*poses)` of all poses of the same mesh, so that the mesh is connected alike in all of them.
         progress : callable, optional
-            Called with the share of the work that is done, 0 to 1. An error that it raises ends the work.
+            Called with the share of the work that is done, 0 to 1. An error that it raises cancels the work.
         cache : SignatureCache, optional
-            Asked first, and told in the end.
+            Searched for the signature first; a new signature is added to it.
 
         Raises
         ------
@@ -77,7 +83,7 @@ class PoseDescriber:
         SpectrumError
             If the eigenpairs could not be computed.
         MemoryError
-            If they would need more memory than is free; the message says how much.
+            If the eigenpairs would need more memory than is free; the message says how much.
         """
         self._check_parameters()
         connection = connection or connect(mesh, pieces=self.pieces)
@@ -88,17 +94,21 @@ class PoseDescriber:
         surface = prepare_surface(mesh, VERTICES_PER_PAIR * self.n_eigenpairs, connection)
         n_pairs = self.n_eigenpairs + surface.n_components - 1
         mesh, laplacian = better_triangles(surface.mesh, self._laplacian())
-        signature = wave_kernel_signature_of(mesh, n_pairs, self.n_energies, self.accuracy, progress)
-        described = PoseSignature(surface, signature, self.n_eigenpairs, laplacian)
+        step = _Progress.of_share(progress)
+        signature = wave_kernel_signature_of(mesh, n_pairs, self.n_energies, self.accuracy, step)
+        pose = PoseSignature(surface, signature, self.n_eigenpairs, laplacian)
         if cache is not None:
             try:
-                cache.put(key, described)
+                cache.put(key, pose)
             except OSError as error:
-                warnings.warn(f"a signature was not kept for the next time: {error}", stacklevel=2)
-        return described
+                warnings.warn(
+                    Message("a signature was not kept for the next time: {reason}", reason=message_of(error)),
+                    stacklevel=3,
+                )
+        return pose
 
     def describing(self) -> dict[str, str | int]:
-        """What a signature depends on, beside the mesh and what is one surface of it."""
+        """Parameters that a signature depends on, besides the mesh and how it is connected."""
         return {
             "n_eigenpairs": self.n_eigenpairs,
             "n_energies": self.n_energies,
@@ -106,97 +116,164 @@ class PoseDescriber:
             "laplacian": self._laplacian(),
         }
 
+    @one_blas_thread  # poses run in parallel instead: matrices this narrow gain nothing from more threads
     def describe_all(
         self,
         meshes: Sequence[TriangleMesh],
         connections: Sequence[Connection] | None = None,
-        progress: Progress | None = None,
+        progress: ReportFunction | _Progress | None = None,
         names: Sequence[str] | None = None,
         workers: int | None = None,
         cache: SignatureCache | None = None,
     ) -> list[PoseSignature]:
-        """`describe` several poses, side by side where there are cores and memory for it.
+        """`describe` several poses, in parallel if there are cores and memory for it.
 
         Parameters
         ----------
         meshes
             The poses.
-        connections : one a pose, optional
+        connections : one for each pose, optional
             See `describe`. If not given, meshes with the same faces count as poses of one mesh.
         progress
-            Called from the thread that called this.
+            Called with the stage and the share of the work that is done, 0 to 1, in the thread that called this. An
+            error that it raises cancels the work.
         names : optional
-            What to call each pose in messages; "pose 1" and so on if not given.
+            Name of each pose in messages; "pose 1" and so on if not given.
         workers : int, optional
-            How many poses at once; as many as there are cores and memory for if not given, at most four.
+            Number of poses at once; if not given, as many as there are cores and memory for, at most four.
         cache : SignatureCache, optional
-            Asked first, and told of each pose as soon as it is done.
+            Searched for signatures first; each new signature is added to it as soon as it is computed.
 
         Raises
         ------
         ValueError, SpectrumError, MemoryError
-            As `describe`; the message begins with the pose's name.
+            As by `describe`; the message begins with the name of the pose.
         """
-        called = list(names) if names is not None else [f"pose {i + 1}" for i in range(len(meshes))]
-        each = connect_alike(meshes, called, self.pieces) if connections is None else connections
-        done = [0.0] * len(meshes)
-        ended = threading.Event()
-
-        def solve(i: int) -> PoseSignature:
-            def tick(share: float) -> None:
-                done[i] = share
-                if ended.is_set():
-                    raise CancelledError
-
-            try:
-                return self.describe(meshes[i], each[i], tick, cache)
-            except (ValueError, SpectrumError, MemoryError) as error:
-                kind = next(kind for kind in (MemoryError, SpectrumError, ValueError) if isinstance(error, kind))
-                raise kind(f"{called[i]}: {error}") from error
-            finally:
-                done[i] = 1.0
-
-        def report() -> None:
-            if progress:
-                current = next((i for i, share in enumerate(done) if share < 1), len(done) - 1)
-                stage = f"{called[current]} ({current + 1} of {len(done)})"
-                progress(f"pose {current + 1} of {len(done)}" if names is None else stage, sum(done) / len(done))
-
         if not len(meshes):
             return []
-        # One BLAS thread a pose: narrow blocks gain nothing from more.
-        with threadpool_limits(1, "blas"), ThreadPoolExecutor(workers or self._workers(meshes)) as pool:
-            futures = [pool.submit(solve, i) for i in range(len(meshes))]
+        called = names or [Message("pose {number}", number=i + 1) for i in range(len(meshes))]
+        connected = connect_alike(meshes, called, self.pieces) if connections is None else connections
+        shared = _SharedProgress(_Progress.of(progress), names, len(meshes))
+
+        def describe(i: int) -> PoseSignature:
+            try:
+                return self.describe(meshes[i], connected[i], shared.of_pose(i), cache)
+            except (ValueError, SpectrumError, MemoryError) as error:
+                kind = next(kind for kind in (MemoryError, SpectrumError, ValueError) if isinstance(error, kind))
+                raise kind(Message("{name}: {reason}", name=called[i], reason=message_of(error))) from error
+            finally:
+                shared.finish(i)
+
+        with ThreadPoolExecutor(workers or self._workers(meshes)) as pool:
+            futures = [pool.submit(describe, i) for i in range(len(meshes))]
             try:
                 waiting = set(futures)
                 while waiting:
-                    report()
+                    shared.report()
                     finished, waiting = wait(waiting, PROGRESS_SECONDS, FIRST_COMPLETED)
                     for future in finished:
                         future.result()
             except BaseException:
-                ended.set()
+                shared.cancel()
                 for future in futures:
                     future.cancel()
                 raise
-        report()
+        shared.report()
         return [future.result() for future in futures]
 
     def estimate(self, meshes: Sequence[TriangleMesh]) -> tuple[float, int]:
-        """Seconds and bytes that poses will take, roughly, before any work is done.
+        """Rough estimate of the seconds and bytes that `describe_all` will take.
 
-        Side by side they save a fifth of the time at most, which thin shapes more than need: it is not counted.
+        Parallel work is not counted: it saves a fifth of the time at most, and thin shapes need more than that in
+        addition.
         """
-        seconds = sum(seconds_needed(self._refined(mesh), self.n_eigenpairs, self.accuracy) for mesh in meshes)
-        needed = sorted(memory_needed(self._refined(mesh), self.n_eigenpairs, self.accuracy) for mesh in meshes)
+        seconds = sum(seconds_needed(self._n_refined(mesh), self.n_eigenpairs, self.accuracy) for mesh in meshes)
+        needed = sorted(memory_needed(self._n_refined(mesh), self.n_eigenpairs, self.accuracy) for mesh in meshes)
         return BESIDE_EIGENPAIRS * seconds, sum(needed[-self._workers(meshes) :])
 
-    def _refined(self, mesh: TriangleMesh) -> int:
-        """Vertices of the refined surface, about: what is fine already stays, the rest comes on top."""
+    def _described(self, mesh: AnyPose) -> Workpiece:
+        """The pose with its signature, computed if it has none.
+
+        TypeError if it is not a pose; ValueError if its signature was made with other parameters.
+        """
+        pose = mesh.pose if isinstance(mesh, Workpiece) else mesh
+        if isinstance(pose, TriangleMesh):
+            return Workpiece(self.describe(pose))
+        if not isinstance(pose, PoseSignature):
+            raise TypeError(f"a pose must be a TriangleMesh or a PoseSignature, not {type(pose).__name__}")
+        n_energies = pose.signature.shape[1]
+        if (pose.n_eigenpairs, n_energies) != (self.n_eigenpairs, self.n_energies):
+            raise ValueError(
+                Message(
+                    "the signature has {pairs} eigenpairs and {energies} energies, "
+                    "the model {model_pairs} and {model_energies}",
+                    pairs=pose.n_eigenpairs,
+                    energies=n_energies,
+                    model_pairs=self.n_eigenpairs,
+                    model_energies=self.n_energies,
+                )
+            )
+        return mesh if isinstance(mesh, Workpiece) else Workpiece(pose)
+
+    def _all_described(
+        self, meshes: Sequence[AnyPose], progress: _Progress, cache: SignatureCache | None
+    ) -> list[Workpiece]:
+        """The poses with their signatures, which are computed for those that have none."""
+        new = {i: mesh for i, mesh in enumerate(meshes) if isinstance(mesh, TriangleMesh)}
+        signatures = dict(zip(new, self.describe_all(list(new.values()), None, progress, cache=cache), strict=True))
+        return [self._described(signatures.get(i, mesh)) for i, mesh in enumerate(meshes)]
+
+    def _n_refined(self, mesh: TriangleMesh) -> int:
+        """About how many vertices the refined surface has: the mesh's own vertices stay, refining adds the others."""
         return mesh.n_vertices + VERTICES_PER_PAIR * self.n_eigenpairs
 
     def _workers(self, meshes: Sequence[TriangleMesh]) -> int:
-        """Poses for which there are cores and memory at once."""
-        largest = max((self._refined(mesh) for mesh in meshes), default=1)
+        """Number of poses for which there are cores and memory at the same time."""
+        largest = max((self._n_refined(mesh) for mesh in meshes), default=1)
         needed = memory_needed(largest, self.n_eigenpairs, self.accuracy)
         return max(1, min(MAX_WORKERS, len(meshes), os.cpu_count() or 1, available_memory() // needed))
+
+
+class _SharedProgress:
+    """Progress of poses that several threads describe, which one thread reports.
+
+    Parameters
+    ----------
+    progress : Progress
+        Of all poses together.
+    names : sequence of str, optional
+        Of the poses, for the stage that is reported.
+    n_poses : int
+    """
+
+    def __init__(self, progress: _Progress, names: Sequence[str] | None, n_poses: int) -> None:
+        self._progress, self._names = progress, names
+        self._done = [0.0] * n_poses
+        self._canceled = threading.Event()
+
+    def of_pose(self, i: int) -> _Progress:
+        """Progress of one pose, for the thread that describes it; raises CancelledError there after `cancel`."""
+        return _Progress.of_share(partial(self._note, i))
+
+    def finish(self, i: int) -> None:
+        """Count a pose as done."""
+        self._done[i] = 1.0
+
+    def cancel(self) -> None:
+        """End the work on all poses at their next report."""
+        self._canceled.set()
+
+    def report(self) -> None:
+        """ReportFunction the mean over the poses, under the name of the first pose that is not done."""
+        count = len(self._done)
+        current = next((i for i, share in enumerate(self._done) if share < 1), count - 1)
+        if self._names is None:
+            stage = Message("pose {number} of {count}", number=current + 1, count=count)
+        else:
+            stage = Message("{name} ({number} of {count})", name=self._names[current], number=current + 1, count=count)
+        self._progress(sum(self._done) / count, stage)
+
+    def _note(self, i: int, share: float) -> None:
+        self._done[i] = share
+        if self._canceled.is_set():
+            raise CancelledError

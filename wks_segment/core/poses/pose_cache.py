@@ -1,10 +1,11 @@
-"""A pose in work: what labeling finds out about it is kept, so that other settings are a matter of moments."""
+"""A described pose with a cache of intermediate results, so that relabeling with other settings is fast."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
+from enum import Enum, auto
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -12,28 +13,59 @@ from ..geometry.creases import coarse_curvature, outward
 from ..geometry.heat_flow import Flows
 from ..mesh.adjacency import FaceAdjacency
 from ..mesh.surface import Surface
-from ..mesh.triangle_mesh import FloatArray
+from ..mesh.triangle_mesh import FloatArray, TriangleMesh
 from .pose_signature import PoseSignature
 
-T = TypeVar("T")
+R = TypeVar("R")
 
 
-class Memo:
-    """Results by name, each with what it was made from; made again where that is something else."""
+class Kind(Enum):
+    """Kinds of intermediate results that are kept with a pose."""
+
+    POSTERIORS = auto()
+    SMOOTH_POSTERIORS = auto()
+    POLYGON_MESH = auto()
+    MEAN_POSTERIORS = auto()
+    POLYGON_NEIGHBORS = auto()
+    REGIONS = auto()
+    FIELDS = auto()
+    TRAITS = auto()
+    SIDE_FIELD = auto()
+
+
+class ResultKey(NamedTuple):
+    """Key of an intermediate result.
+
+    Attributes
+    ----------
+    kind : Kind
+    n_poses : int
+        Number of poses that the result was computed from together; it is kept with the first one.
+    polygons : bool
+        Whether the result is about polygons; otherwise it is about triangles or vertices.
+    """
+
+    kind: Kind
+    n_poses: int = 1
+    polygons: bool = False
+
+
+class ResultCache:
+    """Intermediate results by key, each with its inputs; computed again when an input is another one."""
 
     def __init__(self) -> None:
-        self._kept: dict[Hashable, tuple[tuple[Any, ...], Any]] = {}
+        self._results: dict[ResultKey, tuple[tuple[Any, ...], Any]] = {}
 
-    def get(self, name: Hashable, made_from: tuple[Any, ...], make: Callable[[], T]) -> T:
-        """A result; made if there is none, or it is from other objects or numbers."""
-        if name not in self._kept or not _same(self._kept[name][0], made_from):
-            self._kept[name] = made_from, make()
-        result: T = self._kept[name][1]
+    def get(self, key: ResultKey, inputs: tuple[Any, ...], compute: Callable[[], R]) -> R:
+        """The result under a key; computed if there is none, or if it is from other objects or numbers."""
+        if key not in self._results or not _same(self._results[key][0], inputs):
+            self._results[key] = inputs, compute()
+        result: R = self._results[key][1]
         return result
 
 
 def _same(before: tuple[Any, ...], now: tuple[Any, ...]) -> bool:
-    """Whether they hold the same objects, or equal numbers."""
+    """Whether both hold the same objects, or equal numbers."""
     return len(before) == len(now) and all(
         a is b or (isinstance(a, int | float) and isinstance(b, int | float) and a == b)
         for a, b in zip(before, now, strict=True)
@@ -41,36 +73,45 @@ def _same(before: tuple[Any, ...], now: tuple[Any, ...]) -> bool:
 
 
 class Workpiece:
-    """One pose, to be labeled again and again.
+    """A described pose with a cache of intermediate results, to be labeled several times with other settings.
 
-    Takes the place of its `PoseSignature` in every method of a model, with the same result. Holds several times its
-    memory, so it should go when the work is done. Not for several threads at once.
+    Every method of a model accepts a `Workpiece` instead of a `PoseSignature` and gives the same result. It takes
+    several times the memory, so drop it when the labels are final. Not for use by several threads at once.
+
+        pose = Workpiece(model.describe(mesh))
+        coarse, fine = (model.with_segments(n).segment_faces(pose) for n in (4, 8))
 
     Parameters
     ----------
     pose : PoseSignature
+        The described pose.
 
     Attributes
     ----------
     flows : Flows
-        Of the surface.
-    memo : Memo
-        What models find out.
+        Heat flows on the surface.
+    results : ResultCache
+        Intermediate results of models on this pose.
     """
 
     def __init__(self, pose: PoseSignature) -> None:
         self.pose = pose
         self.flows = Flows(pose.surface.mesh)
-        self.memo = Memo()
+        self.results = ResultCache()
 
     @property
     def surface(self) -> Surface:
-        """Of the pose."""
+        """The welded and refined surface, with n' vertices."""
         return self.pose.surface
+
+    @property
+    def signature(self) -> FloatArray:
+        """(n', n_energies) signature at the vertices of the surface."""
+        return self.pose.signature
 
     @cached_property
     def neighbors(self) -> FaceAdjacency:
-        """Of the original faces, for a surface of area 1."""
+        """Neighbors among the m original faces, with border lengths for a surface of area 1."""
         original = self.surface.original
         return FaceAdjacency.of(self.surface.welded_faces, original.vertices / np.sqrt(original.area))
 
@@ -82,5 +123,9 @@ class Workpiece:
 
     @cached_property
     def curvature(self) -> FloatArray:
-        """(p,) curvature from one of these to the next."""
+        """(p,) curvature across the border of each pair of `neighbors`."""
         return coarse_curvature(self.surface, self.neighbors, self.flows)
+
+
+AnyPose = TriangleMesh | PoseSignature | Workpiece
+"""A pose as methods of a model accept it: the later in this list, the less is left to compute."""

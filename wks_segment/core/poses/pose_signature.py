@@ -1,4 +1,4 @@
-"""What is known of one pose: its surface and the signature of each of its vertices."""
+"""A described pose: a surface and the signature of each of its vertices."""
 
 from __future__ import annotations
 
@@ -13,22 +13,23 @@ from ..mesh.surface import Surface
 from ..mesh.triangle_mesh import FloatArray, TriangleMesh
 from ..spectral.intrinsic_delaunay import Laplacian
 
-_MAPS = ("vertex_of", "face_of", "welded_faces")
+_SURFACE_MAPS = ("vertex_of", "face_of", "welded_faces")
 
 
 @dataclass(frozen=True)
 class PoseSignature:
-    """One pose, described: what takes the time, to be computed once and used for learning and labeling.
+    """A described pose: what takes long to compute, to be computed once and used for learning and labeling.
 
     Attributes
     ----------
     surface : Surface
         The welded and refined surface, with n' vertices.
     signature : (n', n_energies) array of float
+        Wave kernel signature at each vertex of the surface.
     n_eigenpairs : int
-        What it was computed from.
+        Number of eigenpairs that the signature was computed from.
     laplacian : "cotangent" or "delaunay"
-        The triangles that it was computed on.
+        The triangles that the Laplacian was computed on.
     """
 
     surface: Surface
@@ -37,11 +38,11 @@ class PoseSignature:
     laplacian: Laplacian = "cotangent"
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """What a file keeps; see `of_arrays`."""
+        """Arrays by name, to be written to a file; `of_arrays` reads them."""
         return {
             **{f"original_{name}": array for name, array in self.surface.original.arrays().items()},
             **{f"surface_{name}": array for name, array in self.surface.mesh.arrays().items()},
-            **{name: getattr(self.surface, name) for name in _MAPS},
+            **{name: getattr(self.surface, name) for name in _SURFACE_MAPS},
             "signature": self.signature,
             "n_eigenpairs": np.array(self.n_eigenpairs),
             "delaunay": np.array(self.laplacian == "delaunay"),
@@ -49,7 +50,7 @@ class PoseSignature:
 
     @classmethod
     def of_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> PoseSignature:
-        """From what `arrays` gave; KeyError or ValueError if it is not that."""
+        """The described pose in arrays that `arrays` made; KeyError or ValueError if they are none."""
         original, surface = (
             TriangleMesh.of_arrays({
                 name.removeprefix(f"{which}_"): array for name, array in arrays.items() if name.startswith(f"{which}_")
@@ -60,7 +61,7 @@ class PoseSignature:
         if signature.ndim != 2 or len(signature) != surface.n_vertices:
             raise ValueError(f"the signature has the shape {signature.shape}, for {surface.n_vertices} vertices")
         return cls(
-            Surface(original, surface, *(arrays[name] for name in _MAPS)),
+            Surface(original, surface, *(arrays[name] for name in _SURFACE_MAPS)),
             signature,
             int(arrays["n_eigenpairs"]),
             "delaunay" if arrays["delaunay"] else "cotangent",

@@ -1,6 +1,7 @@
-"""Signatures, and what else takes time, that were computed before, by the content of what they were computed from.
+"""Caches of signatures, and of other results that take long, by the content of their inputs.
 
-A cache is given to `describe_all`; there is none unasked. In memory for one process, on disk for several.
+Nothing is cached unless a cache is passed to `describe_all` or `fit`: one in memory for one process, or one on disk for
+several.
 """
 
 from __future__ import annotations
@@ -25,22 +26,23 @@ from ..mesh.surface import Connection
 from ..mesh.triangle_mesh import TriangleMesh
 from .pose_signature import PoseSignature
 
-VERSION = 1
+SIGNATURE_VERSION = 1
 """To be raised whenever the same mesh and settings give another signature than before."""
 MEMORY = 1_000_000_000
-"""Bytes that a cache in memory holds at most, if nothing else is said …"""
+"""Default limit of a cache in memory, in bytes: about 100 poses of 10,000 vertices."""
 DISK = 10_000_000_000
-"""… and one on disk."""
-SUFFIX, UNFINISHED = ".npz", ".part"
+"""Default limit of a cache on disk, in bytes."""
+CACHE_SUFFIX, UNFINISHED_SUFFIX = ".npz", ".part"
 ABANDONED = 3600.0
-"""Seconds after which an unfinished file is of a process that is no more."""
+"""An unfinished file that is older than this, in seconds, was left by a process that has died: writing one takes
+seconds."""
 
 
 class SignatureCache(Protocol):
-    """Where signatures are kept. Several threads may ask at once."""
+    """A cache of signatures. Several threads may use it at once."""
 
     def get(self, key: str) -> PoseSignature | None:
-        """What was put there under a key; None if nothing, or nothing any more."""
+        """The signature under a key; None if there is none, or none any more."""
         ...
 
     def put(self, key: str, signature: PoseSignature) -> None:
@@ -49,106 +51,118 @@ class SignatureCache(Protocol):
 
 
 class Cache(SignatureCache, Protocol):
-    """Where arrays of any kind are kept, signatures among them."""
+    """A cache of arrays of any kind, including signatures."""
 
     def arrays(self, key: str) -> Mapping[str, NDArray[Any]] | None:
-        """What `keep` was given under a key; None if nothing, or nothing any more."""
+        """The arrays that `keep` stored under a key; None if there are none, or none any more."""
         ...
 
     def keep(self, key: str, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Keep arrays under a key; they must not be changed any more."""
+        """Keep arrays under a key; the caller must not change them afterwards."""
         ...
 
 
 def signature_key(mesh: TriangleMesh, connection: Connection, settings: Mapping[str, str | int]) -> str:
-    """A name for the signature of a mesh with settings: another one if anything that enters it differs.
+    """Cache key of a signature: another key if the mesh, its connection or a setting differs in any bit.
 
-    By content as it is: the same mesh elsewhere in space is another one.
+    The same mesh at another place in space has another key.
     """
-    digest = hashlib.blake2b(digest_size=20)
-    digest.update(repr((VERSION, sorted(settings.items()))).encode())
     arrays = {**mesh.arrays(), "welded": connection.welded, "kept": connection.kept, "ties": connection.ties}
-    for name, array in arrays.items():
-        # Shapes keep apart what would be the same row of bytes.
-        digest.update(repr((name, array.shape, array.dtype.str)).encode())
-        digest.update(np.ascontiguousarray(array).data)
+    return content_key((SIGNATURE_VERSION, sorted(settings.items())), arrays)
+
+
+def content_key(description: object, *groups: Mapping[str, NDArray[Any]]) -> str:
+    """Hash of a description, by its `repr`, and of all bytes of named arrays."""
+    digest = hashlib.blake2b(digest_size=20)
+    digest.update(repr(description).encode())
+    for arrays in groups:
+        for name, array in arrays.items():
+            # Arrays of other shapes can have the same bytes.
+            digest.update(repr((name, array.shape, array.dtype.str)).encode())
+            digest.update(np.ascontiguousarray(array).data)
     return digest.hexdigest()
 
 
 class MemoryCache:
-    """Signatures in memory, of which the least recently used leave first.
+    """Cache in memory; the least recently used entries are dropped first.
+
+        cache = MemoryCache()
+        six, four = (PoseSegmentation(n).fit(meshes, cache=cache) for n in (6, 4))  # the second takes a fraction
 
     Parameters
     ----------
     limit : int
-        Bytes at most. What is larger alone is not kept.
+        Maximum size in bytes. A larger single entry is not kept.
     """
 
     def __init__(self, limit: int = MEMORY) -> None:
         self.limit = limit
-        self._kept: OrderedDict[str, tuple[Any, int]] = OrderedDict()
+        self._entries: OrderedDict[str, tuple[Any, int]] = OrderedDict()
         self._lock = threading.Lock()
 
     @property
     def size(self) -> int:
-        """Bytes that are held."""
+        """Size of all entries in bytes."""
         with self._lock:
-            return sum(size for _, size in self._kept.values())
+            return self._size()
 
     def get(self, key: str) -> PoseSignature | None:
         """See `SignatureCache`."""
-        found = self._found(key)
-        return found if isinstance(found, PoseSignature) else None
+        entry = self._entry(key)
+        return entry if isinstance(entry, PoseSignature) else None
 
     def put(self, key: str, signature: PoseSignature) -> None:
         """See `SignatureCache`."""
-        signature.signature.setflags(write=False)  # all who ask get the same one
-        self._keep(key, signature, signature.arrays())
+        signature.signature.setflags(write=False)  # every caller of `get` receives the same array
+        self._add(key, signature, signature.arrays())
 
     def arrays(self, key: str) -> Mapping[str, NDArray[Any]] | None:
         """See `Cache`."""
-        found = self._found(key)
-        return found if isinstance(found, dict) else None
+        entry = self._entry(key)
+        return entry if isinstance(entry, dict) else None
 
     def keep(self, key: str, arrays: Mapping[str, NDArray[Any]]) -> None:
         """See `Cache`."""
         for array in arrays.values():
             array.setflags(write=False)
-        self._keep(key, dict(arrays), arrays)
-
-    def _found(self, key: str) -> object:
-        with self._lock:
-            if key not in self._kept:
-                return None
-            self._kept.move_to_end(key)
-            return self._kept[key][0]
-
-    def _keep(self, key: str, what: object, arrays: Mapping[str, NDArray[Any]]) -> None:
-        with self._lock:
-            self._kept.pop(key, None)
-            self._kept[key] = what, sum(array.nbytes for array in arrays.values())
-            held = sum(size for _, size in self._kept.values())
-            while held > self.limit:
-                held -= self._kept.popitem(last=False)[1][1]
+        self._add(key, dict(arrays), arrays)
 
     def clear(self) -> None:
-        """Forget all."""
+        """Drop all entries."""
         with self._lock:
-            self._kept.clear()
+            self._entries.clear()
+
+    def _entry(self, key: str) -> object:
+        with self._lock:
+            if key not in self._entries:
+                return None
+            self._entries.move_to_end(key)
+            return self._entries[key][0]
+
+    def _add(self, key: str, entry: object, arrays: Mapping[str, NDArray[Any]]) -> None:
+        with self._lock:
+            self._entries.pop(key, None)
+            self._entries[key] = entry, sum(array.nbytes for array in arrays.values())
+            size = self._size()
+            while size > self.limit:
+                size -= self._entries.popitem(last=False)[1][1]
+
+    def _size(self) -> int:
+        return sum(size for _, size in self._entries.values())
 
 
 class DiskCache:
-    """Signatures in the files of a folder, of which the least recently used are removed first.
+    """Cache in the files of a folder; the least recently used files are removed first.
 
-    Several processes may use the folder at once: a file appears whole or not at all, and one that is damaged counts as
-    none.
+    Several processes may use the folder at once: a file appears as a whole or not at all, and a damaged file counts as
+    missing.
 
     Parameters
     ----------
     folder : path
-        Made if it is not there. Nothing else should be in it.
+        Created if it does not exist. It should contain nothing else.
     limit : int
-        Bytes at most, but for what others are writing.
+        Maximum size in bytes, not counting files that other processes are writing.
     """
 
     def __init__(self, folder: str | os.PathLike[str], limit: int = DISK) -> None:
@@ -172,16 +186,16 @@ class DiskCache:
         """See `Cache`."""
         path = self._path(key)
         try:
-            with np.load(path, allow_pickle=False) as arrays:
-                found = dict(arrays)
+            with np.load(path, allow_pickle=False) as file:
+                arrays = dict(file)
             os.utime(path)
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
             return None
-        return found
+        return arrays
 
     def keep(self, key: str, arrays: Mapping[str, NDArray[Any]]) -> None:
         """See `Cache`; OSError if the file cannot be written."""
-        with tempfile.NamedTemporaryFile(dir=self.folder, suffix=UNFINISHED, delete=False) as file:
+        with tempfile.NamedTemporaryFile(dir=self.folder, suffix=UNFINISHED_SUFFIX, delete=False) as file:
             unfinished = Path(file.name)
             try:
                 np.savez(file, **arrays)
@@ -191,27 +205,27 @@ class DiskCache:
                 raise
         try:
             unfinished.replace(self._path(key))
-        except PermissionError:  # Windows, while another process reads the same: it is there, then
+        except PermissionError:  # on Windows, while another process reads the same file: then it exists already
             unfinished.unlink()
-        self._tidy()
+        self._remove_old_files()
 
     def _path(self, key: str) -> Path:
-        return self.folder / f"{key}{SUFFIX}"
+        return self.folder / f"{key}{CACHE_SUFFIX}"
 
-    def _tidy(self) -> None:
-        """Remove what is too much, and what was abandoned. Others may do so at the same time."""
+    def _remove_old_files(self) -> None:
+        """Remove files above the limit, and abandoned ones. Other processes may do so at the same time."""
         files = []
         for path in self.folder.iterdir():
             with suppress(FileNotFoundError):
                 state = path.stat()
-                if path.suffix == SUFFIX:
+                if path.suffix == CACHE_SUFFIX:
                     files.append((state.st_mtime_ns, state.st_size, path))
-                elif path.suffix == UNFINISHED and state.st_mtime < time.time() - ABANDONED:
+                elif path.suffix == UNFINISHED_SUFFIX and state.st_mtime < time.time() - ABANDONED:
                     path.unlink()
-        held = sum(size for _, size, _ in files)
+        total = sum(size for _, size, _ in files)
         for _, size, path in sorted(files):
-            if held <= self.limit:
+            if total <= self.limit:
                 break
             with suppress(FileNotFoundError, PermissionError):
                 path.unlink()
-            held -= size
+            total -= size

@@ -1,0 +1,213 @@
+"""Connected regions of a pose, and the traits that tell them apart in any pose and on any meshing.
+
+Signatures are the same on the left and on the right. Two mirrored regions have the same image in signature space, but
+it is passed through in opposite senses: for two functions f and g of the signature, df ∧ dg is the signed area that a
+face covers in the plane (f, g). Its sum, weighted by a function that is positive near a region and negative near the
+other regions of its segment, tells left from right by the surroundings. After Ren, Poulenard, Wonka and Ovsjanikov,
+"Continuous and orientation-preserving correspondences via functional maps" (2018), whose operator keeps a map from
+exchanging left and right. Here there is no map, only a few numbers for each region.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix
+
+from ..mesh.adjacency import FaceAdjacency, connected_regions
+from ..mesh.surface import Surface
+from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
+from ..poses.pose_cache import Workpiece
+from ..spectral.laplacian import unit_area_masses
+
+FIELDS = 6
+"""Number of functions of the signature that regions are told apart by; `PLANES` grows with its square."""
+PLANES = FIELDS * (FIELDS - 1) // 2
+SURROUNDINGS = 0.3
+"""Radius of the surroundings of a region, in units of the square root of the area."""
+LEAST_OVERLAP = 1e-6
+"""Lower bound of the overlap of the heat of two regions, whose logarithm is their distance, and of areas."""
+MOST_TRAITS = 200
+"""Maximum number of regions of a pose that have traits, the largest ones: time and model files grow with its square."""
+
+
+@dataclass(frozen=True)
+class Regions:
+    """Connected regions of a pose.
+
+    Attributes
+    ----------
+    region : (m,) int array
+        Region of each face. The r largest regions have the numbers 0, 1, …, r − 1, all others higher ones.
+    segment : (r,) int array
+        Segment of each of the r largest regions.
+    """
+
+    region: IntArray
+    segment: IntArray
+
+    @classmethod
+    def of(cls, labels: IntArray, adjacency: FaceAdjacency, original: TriangleMesh) -> Regions:
+        """Regions of a mesh, given the segment of each face and the neighbors among faces."""
+        region = connected_regions(labels, adjacency)
+        segment_of = np.zeros(int(region.max()) + 1, dtype=np.int64)
+        segment_of[region] = labels
+        largest = np.argsort(-np.bincount(region, original.face_areas), kind="stable")[:MOST_TRAITS]
+        order = np.append(np.sort(largest), np.setdiff1d(np.arange(len(segment_of)), largest))
+        return cls(np.argsort(order)[region], segment_of[np.sort(largest)])
+
+    def traits(self, pose: Workpiece, fields: FloatArray) -> Traits:
+        """Traits of the r largest regions in a pose, given the (n', FIELDS) fields on its surface."""
+        large = np.where(self.region < len(self.segment), self.region, -1)
+        return Traits.of(pose, fields, large, self.segment)
+
+    def centers(self, mesh: TriangleMesh) -> FloatArray:
+        """(r, 3) centers of the r largest regions, in units of the square root of the area; x is 0 in the middle."""
+        places = mesh.unit_face_centers
+        middle = np.average(places[:, 0], weights=mesh.face_areas)
+        count = int(self.region.max()) + 1
+        weights = mesh.face_areas + np.finfo(float).tiny
+        sums = np.stack([np.bincount(self.region, weights * axis, count) for axis in places.T], axis=1)
+        centers = sums / np.bincount(self.region, weights, count)[:, None]
+        return np.asarray(centers[: len(self.segment)] - (middle, 0, 0))
+
+    def numbered(self, names: IntArray, n_known: int) -> IntArray:
+        """(m,) name of the region of each face, given the names of the r largest regions.
+
+        All others get new names, from `n_known` or the highest given name.
+        """
+        n_unnamed = int(self.region.max()) + 1 - len(names)
+        first = max(n_known, int(names.max()) + 1)
+        return np.append(names, first + np.arange(n_unnamed))[self.region]
+
+
+@dataclass(frozen=True)
+class Traits:
+    """Traits that tell the r connected regions of a mesh apart; about the same in any pose and on any meshing.
+
+    Attributes
+    ----------
+    segment : (r,) int array
+    area : (r,) array
+        Share of the whole area.
+    signature : (r, FIELDS) array
+        Mean of the fields over the region.
+    handedness : (r, PLANES) array
+        Σ over faces of h df ∧ dg for all pairs of fields, where h is near 1 at the region and near −1 at the other
+        regions of its segment. It has the opposite sign at the mirrored region.
+    distance : (r, r) array
+        Distance between regions, from the overlap of their heat (Varadhan, 1967), in units of the square root of the
+        area.
+    """
+
+    segment: IntArray
+    area: FloatArray
+    signature: FloatArray
+    handedness: FloatArray
+    distance: FloatArray
+
+    @classmethod
+    def of(cls, pose: Workpiece, fields: FloatArray, region: IntArray, segment: IntArray) -> Traits:
+        """Traits of regions of one pose.
+
+        Parameters
+        ----------
+        pose : Workpiece
+            With n' vertices on its surface and m original faces.
+        fields : (n', FIELDS) array
+            Functions of the signature.
+        region : (m,) int array
+            Region of each face, 0 to r − 1; -1 for a face without a region.
+        segment : (r,) int array
+            Segment of each region.
+        """
+        surface, mesh, original = pose.surface, pose.surface.mesh, pose.surface.original
+        count = len(segment)
+        area = np.bincount(region[region >= 0], original.face_areas[region >= 0], count) / original.area
+        masses = unit_area_masses(mesh)
+        inside = shares_at_vertices(surface, region, count)
+        heat = pose.flows.over(SURROUNDINGS).smooth(inside).astype(np.float64)
+        weighted = inside * masses[:, None]
+        signature = weighted.T @ fields / np.maximum(weighted.sum(axis=0), LEAST_OVERLAP)[:, None]
+        contrast = np.where(segment[:, None] == segment, -1.0, 0.0)
+        np.fill_diagonal(contrast, 0)
+        contrast /= np.maximum(-contrast.sum(axis=0), 1)
+        np.fill_diagonal(contrast, (contrast != 0).any(axis=0))
+        handedness = (heat @ contrast)[mesh.faces].mean(axis=1).T @ _signed_areas(pose, fields)
+        overlap = heat.T @ (heat * masses[:, None]) / masses.sum()
+        size = np.sqrt(np.maximum(area, LEAST_OVERLAP))
+        distance = -SURROUNDINGS * np.log(np.maximum(overlap / np.outer(size, size), LEAST_OVERLAP))
+        return cls(segment, np.maximum(area, LEAST_OVERLAP), signature, handedness, distance)
+
+
+def mean_traits(poses: Sequence[Traits]) -> Traits:
+    """Mean over poses that have the same regions in the same order."""
+    return mean_of_named(poses[0], poses, [np.arange(len(poses[0].segment))] * len(poses))
+
+
+def mean_of_named(first: Traits, poses: Sequence[Traits], names: Sequence[IntArray]) -> Traits:
+    """Mean over poses of the traits of each region of the first one, given the names of the regions in each pose."""
+    count = len(first.segment)
+    area, signature, handedness = np.zeros(count), np.zeros((count, FIELDS)), np.zeros((count, PLANES))
+    times_seen, distance = np.zeros(count), np.zeros((count, count))
+    times_both_seen = np.zeros((count, count))
+    for pose, name in zip(poses, names, strict=True):
+        known = np.flatnonzero(name < count)
+        at = name[known]
+        times_seen[at] += 1
+        area[at] += np.log(pose.area[known])
+        signature[at] += pose.signature[known]
+        handedness[at] += pose.handedness[known]
+        distance[np.ix_(at, at)] += pose.distance[np.ix_(known, known)]
+        times_both_seen[np.ix_(at, at)] += 1
+    seen, times = times_seen > 0, np.maximum(times_seen, 1)
+    return Traits(
+        first.segment,
+        np.where(seen, np.exp(area / times), first.area),
+        np.where(seen[:, None], signature / times[:, None], first.signature),
+        np.where(seen[:, None], handedness / times[:, None], first.handedness),
+        np.where(times_both_seen > 0, distance / np.maximum(times_both_seen, 1), first.distance),
+    )
+
+
+def deviation_of_named(mean: Traits, poses: Sequence[Traits], names: Sequence[IntArray]) -> FloatArray:
+    """(4,) standard deviation over regions and poses of log area, signature, handedness and distance."""
+    squares, count = np.zeros(4), len(mean.segment)
+    times_seen = np.zeros(2)
+    for pose, name in zip(poses, names, strict=True):
+        known = np.flatnonzero(name < count)
+        at = name[known]
+        both = np.ix_(known, known), np.ix_(at, at)
+        squares += (
+            np.sum((np.log(pose.area[known]) - np.log(mean.area[at])) ** 2),
+            np.sum((pose.signature[known] - mean.signature[at]) ** 2) / FIELDS,
+            np.sum((pose.handedness[known] - mean.handedness[at]) ** 2) / PLANES,
+            np.sum((pose.distance[both[0]] - mean.distance[both[1]]) ** 2),
+        )
+        times_seen += len(known), len(known) ** 2
+    # Bessel's correction: the mean is over the same poses.
+    correction = len(poses) / (len(poses) - 1)
+    return np.asarray(np.sqrt(correction * squares / np.maximum(times_seen[[0, 0, 0, 1]], 1)))
+
+
+def shares_at_vertices(surface: Surface, region: IntArray, count: int) -> FloatArray:
+    """(n', count) share of each region in the area around each vertex of the surface.
+
+    Given the region of each original face, 0 to `count` − 1; -1 for a face without a region.
+    """
+    mesh = surface.mesh
+    inside_any = (surface.face_of >= 0) & (region[surface.face_of] >= 0)
+    areas, faces, owner = mesh.face_areas[inside_any], mesh.faces[inside_any], region[surface.face_of[inside_any]]
+    entries = np.repeat(areas, 3), (faces.ravel(), np.repeat(owner, 3))
+    inside: FloatArray = coo_matrix(entries, shape=(mesh.n_vertices, count)).toarray()
+    return inside / np.maximum(inside.sum(axis=1, keepdims=True), np.finfo(float).tiny)
+
+
+def _signed_areas(pose: Workpiece, fields: FloatArray) -> FloatArray:
+    """(m', PLANES) signed area that each face covers in the plane of each pair of (n', FIELDS) fields."""
+    corners = fields[pose.surface.mesh.faces].astype(np.float64)
+    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    f, g = np.triu_indices(FIELDS, 1)
+    return np.asarray((u[:, f] * v[:, g] - u[:, g] * v[:, f]) / 2 * pose.turned[:, None])
