@@ -8,7 +8,7 @@ from wks_segment.core.geometry.creases import (
     border_weights,
     curvature_across,
     log_thickness,
-    outward,
+    outward_signs,
     smooth_normals,
     vertex_normals,
 )
@@ -22,13 +22,13 @@ def adjacency_of(surface):
     return FaceAdjacency.of(surface.welded_faces, surface.original.vertices)
 
 
-def test_outward_does_not_depend_on_the_orientation_of_faces():
+def test_outward_signs_do_not_depend_on_the_orientation_of_faces():
     sphere = together(icosphere(2), TriangleMesh(icosphere(2).vertices + 5, icosphere(2).faces[:, ::-1]))
     faces = sphere.faces.copy()
     chosen = np.random.default_rng(0).random(len(faces)) < 0.5
     faces[chosen] = faces[chosen][:, ::-1]
-    sign = outward(faces, sphere.vertices[faces])
-    expected = outward(sphere.faces, sphere.vertices[sphere.faces])
+    sign = outward_signs(faces, sphere.vertices[faces])
+    expected = outward_signs(sphere.faces, sphere.vertices[sphere.faces])
     np.testing.assert_array_equal(sign, np.where(chosen, -expected, expected))
     assert (expected[: len(expected) // 2] == 1).all()
     assert (expected[len(expected) // 2 :] == -1).all()

@@ -45,7 +45,7 @@ LEAST_THICKNESS = 0.003
 least distance between faces for curvature."""
 
 
-def outward(faces: IntArray, corners: FloatArray) -> FloatArray:
+def outward_signs(faces: IntArray, corners: FloatArray) -> FloatArray:
     """(m,) +1 for each face whose (3, 3) corners turn counter-clockwise seen from outside, −1 for the others.
 
     Neighbors are made consistent; then each island is turned so that its volume is positive.
@@ -74,7 +74,7 @@ def vertex_normals(surface: Surface) -> FloatArray:
     mesh, original = surface.mesh, surface.original
     corners = mesh.vertices[mesh.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    sign = outward(surface.welded_faces, original.vertices[original.faces])
+    sign = outward_signs(surface.welded_faces, original.vertices[original.faces])
     normals *= np.where(surface.face_of >= 0, sign[surface.face_of], 1.0)[:, None]
     return _normalized(indicator(mesh.faces.ravel(), mesh.n_vertices) @ np.repeat(normals, 3, axis=0))
 

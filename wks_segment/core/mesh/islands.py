@@ -62,11 +62,11 @@ def ties_between_islands(faces: IntArray, *poses: FloatArray) -> IntArray:
         nearest[remaining[closer]] = added[index[closer]]
         first = int(np.argmin(np.where(outside, distance, np.inf)))
         newest = int(island[first])
-        ties.append(_contact(places, members[newest], members[island[nearest[first]]], reach))
+        ties.append(_contact_pairs(places, members[newest], members[island[nearest[first]]], reach))
     return np.concatenate(ties)
 
 
-def _contact(places: FloatArray, vertices: IntArray, others: IntArray, reach: float) -> IntArray:
+def _contact_pairs(places: FloatArray, vertices: IntArray, others: IntArray, reach: float) -> IntArray:
     """(t, 2) vertices of an island that are near to another island, each with its nearest vertex there."""
     distance, index = cKDTree(places[others]).query(places[vertices])
     tied = distance <= max(distance.min() + reach, float(np.quantile(distance, LEAST_CONTACT_SHARE)))

@@ -33,7 +33,7 @@ def without_spikes(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """(n, 3) positions with each spike moved to the middle of its neighbors.
 
     A spike is a single vertex far away from its neighbors, as noise of a scan leaves it: its long slivers add area and
-    force eigenfunctions towards zero there. The tip of a horn or a finger is no spike: its height is at most twice the
+    disturb the eigenfunctions. The tip of a horn or a finger is no spike: its height is at most twice the
     edges around its base, or three times the typical edge.
     """
     n = len(vertices)
@@ -72,7 +72,7 @@ def _neighbor_means(vertices: FloatArray, adjacency: csr_matrix, spiky: BoolArra
     return np.where(total > 0, (weights @ vertices) / np.maximum(total, 1), vertices)
 
 
-def small_holes(mesh: TriangleMesh) -> tuple[FloatArray, IntArray]:
+def caps_of_small_holes(mesh: TriangleMesh) -> tuple[FloatArray, IntArray]:
     """Caps that close the small holes of a mesh, each of two rings of faces around the middle of the hole.
 
     Returns

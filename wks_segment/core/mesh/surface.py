@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from ..message import Message, message_of
 from .islands import ties_between_islands
-from .repair import small_holes, without_spikes
+from .repair import caps_of_small_holes, without_spikes
 from .subdivision import split_long_edges
 from .triangle_mesh import (
     BoolArray,
@@ -199,7 +199,7 @@ def prepare_surface(
         vertex_of[outside] = cKDTree(vertices).query(mesh.vertices[outside])[1]
 
     surface = TriangleMesh(without_spikes(vertices, faces), faces)
-    cap_vertices, caps = small_holes(surface)
+    cap_vertices, caps = caps_of_small_holes(surface)
     vertices, faces = np.concatenate([surface.vertices, cap_vertices]), np.concatenate([faces, caps])
     face_of = np.append(face_of, np.full(len(caps), -1))
     if min_vertices:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from ..geometry.creases import coarse_curvature, outward
+from ..geometry.creases import coarse_curvature, outward_signs
 from ..geometry.heat_flow import Flows
 from ..mesh.adjacency import FaceAdjacency
 from ..mesh.surface import Surface
@@ -119,7 +119,7 @@ class Workpiece:
     def turned(self) -> FloatArray:
         """(m',) 1 for each face of the surface that turns counter-clockwise seen from outside, −1 for others."""
         mesh = self.surface.mesh
-        return outward(mesh.faces, mesh.vertices[mesh.faces])
+        return outward_signs(mesh.faces, mesh.vertices[mesh.faces])
 
     @cached_property
     def curvature(self) -> FloatArray:

@@ -140,7 +140,7 @@ def eigenpair_panels(
         )
     _check_memory(mesh.n_vertices, n_pairs, accuracy)
     problem, report = _Problem.of(mesh), Progress.of_share(progress).never_falling()
-    values, panels = _solve(problem, n_pairs, accuracy, report)
+    values, panels = _solve_problem(problem, n_pairs, accuracy, report)
     return values, problem.place, _reported_to_the_end(panels, report)
 
 
@@ -236,7 +236,9 @@ def _along_curve(vertices: FloatArray) -> IntArray:
     return np.argsort(code, kind="stable")
 
 
-def _solve(problem: _Problem, n_pairs: int, accuracy: Accuracy, progress: Progress) -> tuple[FloatArray, Panels]:
+def _solve_problem(
+    problem: _Problem, n_pairs: int, accuracy: Accuracy, progress: Progress
+) -> tuple[FloatArray, Panels]:
     """Eigenvalues, and panels of functions at the vertices of the problem."""
     n = problem.mesh.n_vertices
     zero_modes = problem.zero_modes()[:, :n_pairs]
