@@ -16,23 +16,23 @@ from typing import ParamSpec, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-P = ParamSpec("P")
-R = TypeVar("R")
+Parameters = ParamSpec("Parameters")
+Result = TypeVar("Result")
 
 
-def one_blas_thread(function: Callable[P, R]) -> Callable[P, R]:
+def one_blas_thread(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
     """Decorate a public function: BLAS uses one thread while it runs."""
     return _limited(function, "blas")
 
 
-def one_thread(function: Callable[P, R]) -> Callable[P, R]:
+def one_thread(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
     """Decorate a public function: BLAS and OpenMP, which scikit-learn's k-means uses, have one thread while it runs."""
     return _limited(function, None)
 
 
-def _limited(function: Callable[P, R], user_api: str | None) -> Callable[P, R]:
+def _limited(function: Callable[Parameters, Result], user_api: str | None) -> Callable[Parameters, Result]:
     @wraps(function)
-    def limited(*args: P.args, **kwargs: P.kwargs) -> R:
+    def limited(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
         # Libraries are looked up at each call: some are loaded only after this module.
         with threadpool_limits(1, user_api):
             return function(*args, **kwargs)
