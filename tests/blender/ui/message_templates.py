@@ -7,6 +7,7 @@ named fields. `cli` and `render` are left out, for they speak on the terminal on
 
 import ast
 import builtins
+import re
 import string
 from collections import defaultdict
 from dataclasses import dataclass
@@ -14,11 +15,11 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[3] / "wks_segment"
 TERMINAL = {"cli", "render"}
-INTERNAL = {"NotConvergedError", "TypeError", "KeyError", "AssertionError", "NotImplementedError"}
+INTERNAL = {"NotConvergedError", "SingularError", "TypeError", "KeyError", "AssertionError", "NotImplementedError"}
 """Errors that the code catches itself, or that only a programmer can cause."""
 POSITIONS = {
     **dict.fromkeys(["Message", "in_panel", "in_tooltip", "in_report", "wrapped", "warn", "titled"], 0),
-    **dict.fromkeys(["explain", "step", "each", "progress"], 1),
+    **dict.fromkeys(["explain", "step", "each", "progress", "finish"], 1),
     **dict.fromkeys(["tell", "part"], 2),
 }
 """Where a call has its text, by the name of what is called; errors have it first."""
@@ -171,9 +172,28 @@ def templates():
 
 
 def is_sentence(text):
-    """Whether a text that is returned is for a person: several words, and no name, in which all are capitalized."""
-    words = text.split()
-    return len(words) > 1 and any(word.isalpha() and word.islower() for word in words)
+    """Whether a text reads like one for a person: several words, and no name, in which all words are capitalized."""
+    words = re.findall("[A-Za-z]{2,}", text)
+    return " " in text.strip() and len(words) > 1 and any(map(str.islower, words))
+
+
+def sentences_made_on_the_spot():
+    """(place, f-string) of all f-strings that read like a sentence, wherever they go to."""
+    for source in SOURCES:
+        internal = {
+            part
+            for node in ast.walk(source.tree)
+            if isinstance(node, ast.Call) and name_of(node.func) in INTERNAL
+            for part in ast.walk(node)
+        }
+        for node in ast.walk(source.tree):
+            if isinstance(node, ast.JoinedStr) and node not in internal and is_sentence(literals(node)):
+                yield f"{source.path.relative_to(PACKAGE)}:{node.lineno}", ast.unparse(node)
+
+
+def literals(node):
+    """The text of an f-string, with {} for the values."""
+    return "".join(part.value if isinstance(part, ast.Constant) else "{}" for part in node.values)
 
 
 def fields(template):

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import bpy
 import pytest
-from message_templates import SOURCES, all_calls, fields, name_of, templates
+from message_templates import SOURCES, all_calls, fields, name_of, sentences_made_on_the_spot, templates
 
 from wks_segment.blender.operators import _report
 from wks_segment.blender.ui import messages
@@ -80,6 +80,10 @@ def test_nobody_speaks_past_the_translation(call):
     keywords = {keyword.arg for keyword in call.node.keywords}
     if isinstance(call.text, ast.Constant) and (call.name == "Message" or call.name.endswith("Error")):
         assert fields(call.text.value) - {"self"} == keywords or None in keywords, ast.unparse(call.node)
+
+
+def test_no_sentence_is_made_on_the_spot():
+    assert dict(sentences_made_on_the_spot()) == {}
 
 
 def test_reports_and_labels_go_through_the_translation():
@@ -177,7 +181,9 @@ def test_job_and_panel_speak_german(extension, monkeypatch):
 
     job = BackgroundJob("Learn and Segment", lambda progress: None, lambda: None)
     job.wait(5)
-    job.stage, job.share = 'Signature of "Fox, frame 12" (3 of 5)', 0.375
+    pose = Message("{character}, {pose}", character="Fox", pose=Message("frame {frame}", frame=12))
+    counted = Message("{name} ({number} of {count})", name=Message('"{pose}"', pose=pose), number=3, count=5)
+    job.stage, job.share = Message("Signature of {stage}", stage=counted), 0.375
     assert job_texts(job) == ("Signature of Fox, frame 12 · 3 of 5", "38 %")
     monkeypatch.setattr(messages, "bpy", Blender("de_DE"))
     assert job_texts(job) == ("Signatur von Fox, Frame 12 · 3 von 5", "38 %")

@@ -13,6 +13,7 @@ from itertools import count
 import numpy as np
 
 from ...core.mesh.triangle_mesh import IntArray
+from ...core.message import Message
 
 SIDE_STEP = 1000
 """From the middle to the left, and from there to the right. More than a model has segments, so that a number means the
@@ -45,9 +46,11 @@ def unique_parts(parts: IntArray) -> list[int]:
     return in_order
 
 
-def count_text(n_segments: int, n_parts: int) -> str:
+def count_text(n_segments: int, n_parts: int) -> Message:
     """How many segments, and how many parts if these are more."""
-    return f"{n_segments} segments in {n_parts} parts" if n_parts > n_segments else f"{n_segments} segments"
+    if n_parts > n_segments:
+        return Message("{segments} segments in {parts} parts", segments=n_segments, parts=n_parts)
+    return Message("{count} segments", count=n_segments)
 
 
 def default_name(part: int) -> str:

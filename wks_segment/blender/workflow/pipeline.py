@@ -176,7 +176,7 @@ def describe(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[W
                 [poses[i].mesh for i in distinct],
                 [connections[i] for i in distinct],
                 run.progress.titled("Signature of {stage}").report,
-                [f'"{poses[i].name}"' for i in distinct],
+                [Message('"{pose}"', pose=poses[i].name) for i in distinct],
                 workers=run.workers,
                 cache=run.cache,
             )

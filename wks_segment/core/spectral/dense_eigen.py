@@ -22,6 +22,8 @@ from numpy.typing import NDArray
 from scipy import LowLevelCallable
 from scipy.linalg import LinAlgError, cython_lapack, eigh, solve_triangular
 
+from ..message import Message
+
 ARGUMENTS, INTEGER_ARGUMENTS = 21, 11
 """Number of arguments of `ssyevr`, and of those that are pointers to integers."""
 SOLVE_COLUMNS = 256
@@ -64,7 +66,7 @@ def lowest_eigenpairs(matrix: NDArray[Any], count: int) -> tuple[NDArray[np.floa
             floats.ctypes, _int(sizes[0]), integers.ctypes, _int(sizes[1]), ctypes.byref(info),
         )  # fmt: skip
         if info.value:
-            raise LinAlgError(f"the dense eigensolver failed ({info.value})")
+            raise LinAlgError(Message("the dense eigensolver failed ({code})", code=info.value))
     return values[: n_found.value], vectors[:, : n_found.value]
 
 
