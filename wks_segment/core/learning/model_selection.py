@@ -28,8 +28,8 @@ EARNED = 0.8
 """A covariance type other than the first is chosen if its labels disagree between the poses by less than this fraction
 of the disagreement of the first: more parameters must earn their place."""
 REGROUPING_ROUNDS = 5
-"""Maximum number of times that components are joined again, each time with the scattered segments
-first; more rounds could go on without an end."""
+"""Maximum number of times that components are joined again, each time with the components of scattered segments first;
+each round can scatter other segments."""
 LEAST_COMPONENTS, PER_SEGMENT, MOST_MORE = 24, 3, 64
 """The mixture has `PER_SEGMENT` components for each segment, but at least `LEAST_COMPONENTS`, and at most `MOST_MORE`
 more than segments: with fewer, borders that people would draw are missing; with more, a fit takes longer."""

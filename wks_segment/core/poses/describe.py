@@ -13,8 +13,7 @@ from typing import Literal
 from ..mesh.surface import Connection, Pieces, connect, connect_alike, prepare_surface
 from ..mesh.triangle_mesh import TriangleMesh
 from ..message import Message, message_of
-from ..progress import Progress as _Progress
-from ..progress import ReportFunction, ShareFunction
+from ..progress import Progress, ReportFunction, ShareFunction
 from ..spectral.eigenpairs import Accuracy, SpectrumError, memory_needed, seconds_needed
 from ..spectral.intrinsic_delaunay import Laplacian, better_triangles
 from ..spectral.memory import available_memory
@@ -23,8 +22,6 @@ from ..threads import one_blas_thread
 from .pose_cache import AnyPose, Workpiece
 from .pose_signature import PoseSignature
 from .signature_cache import SignatureCache, signature_key
-
-Progress = ReportFunction
 
 VERTICES_PER_PAIR = 15
 """A surface is refined until it has this many vertices for each eigenpair: about six to the shortest wavelength."""
@@ -57,7 +54,7 @@ class PoseDescriber:
         self,
         mesh: TriangleMesh,
         connection: Connection | None = None,
-        progress: ShareFunction | _Progress | None = None,
+        progress: ShareFunction | Progress | None = None,
         cache: SignatureCache | None = None,
     ) -> PoseSignature:
         """Compute the signature of one pose; every other method accepts the result instead of the mesh.
@@ -94,7 +91,7 @@ class PoseDescriber:
         surface = prepare_surface(mesh, VERTICES_PER_PAIR * self.n_eigenpairs, connection)
         n_pairs = self.n_eigenpairs + surface.n_components - 1
         mesh, laplacian = better_triangles(surface.mesh, self._laplacian())
-        step = _Progress.of_share(progress)
+        step = Progress.of_share(progress)
         signature = wave_kernel_signature_of(mesh, n_pairs, self.n_energies, self.accuracy, step)
         pose = PoseSignature(surface, signature, self.n_eigenpairs, laplacian)
         if cache is not None:
@@ -121,7 +118,7 @@ class PoseDescriber:
         self,
         meshes: Sequence[TriangleMesh],
         connections: Sequence[Connection] | None = None,
-        progress: ReportFunction | _Progress | None = None,
+        progress: ReportFunction | Progress | None = None,
         names: Sequence[str] | None = None,
         workers: int | None = None,
         cache: SignatureCache | None = None,
@@ -153,7 +150,7 @@ class PoseDescriber:
             return []
         called = names or [Message("pose {number}", number=i + 1) for i in range(len(meshes))]
         connected = connect_alike(meshes, called, self.pieces) if connections is None else connections
-        shared = _SharedProgress(_Progress.of(progress), names, len(meshes))
+        shared = _SharedProgress(Progress.of(progress), names, len(meshes))
 
         def describe(i: int) -> PoseSignature:
             try:
@@ -216,7 +213,7 @@ class PoseDescriber:
         return mesh if isinstance(mesh, Workpiece) else Workpiece(pose)
 
     def _all_described(
-        self, meshes: Sequence[AnyPose], progress: _Progress, cache: SignatureCache | None
+        self, meshes: Sequence[AnyPose], progress: Progress, cache: SignatureCache | None
     ) -> list[Workpiece]:
         """The poses with their signatures, which are computed for those that have none."""
         new = {i: mesh for i, mesh in enumerate(meshes) if isinstance(mesh, TriangleMesh)}
@@ -246,14 +243,14 @@ class _SharedProgress:
     n_poses : int
     """
 
-    def __init__(self, progress: _Progress, names: Sequence[str] | None, n_poses: int) -> None:
+    def __init__(self, progress: Progress, names: Sequence[str] | None, n_poses: int) -> None:
         self._progress, self._names = progress, names
         self._done = [0.0] * n_poses
         self._canceled = threading.Event()
 
-    def of_pose(self, i: int) -> _Progress:
+    def of_pose(self, i: int) -> Progress:
         """Progress of one pose, for the thread that describes it; raises CancelledError there after `cancel`."""
-        return _Progress.of_share(partial(self._note, i))
+        return Progress.of_share(partial(self._note, i))
 
     def finish(self, i: int) -> None:
         """Count a pose as done."""

@@ -16,7 +16,7 @@ from ..mesh.surface import Surface
 from ..mesh.triangle_mesh import FloatArray, TriangleMesh
 from .pose_signature import PoseSignature
 
-R = TypeVar("R")
+Result = TypeVar("Result")
 
 
 class Kind(Enum):
@@ -56,11 +56,11 @@ class ResultCache:
     def __init__(self) -> None:
         self._results: dict[ResultKey, tuple[tuple[Any, ...], Any]] = {}
 
-    def get(self, key: ResultKey, inputs: tuple[Any, ...], compute: Callable[[], R]) -> R:
+    def get(self, key: ResultKey, inputs: tuple[Any, ...], compute: Callable[[], Result]) -> Result:
         """The result under a key; computed if there is none, or if it is from other objects or numbers."""
         if key not in self._results or not _same(self._results[key][0], inputs):
             self._results[key] = inputs, compute()
-        result: R = self._results[key][1]
+        result: Result = self._results[key][1]
         return result
 
 
