@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ...core.message import Message
 from ..workflow.live_session import session_of
 from . import _needs, _report
 from ._base import BaseOperator
@@ -22,4 +23,4 @@ class WKS_SEGMENT_OT_accept(BaseOperator, bpy.types.Operator):
         job = session_of(context).update(context.scene)
         if job.request.outputs.colors:
             _report.show_colors(context)
-        return _report.finish(self, "Accepted", job.report)
+        return _report.finish(self, Message("Accepted"), job.report)

@@ -26,4 +26,4 @@ class WKS_SEGMENT_OT_update(BaseOperator, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         job = session_of(context).update(context.scene)
-        return _report.finish(self, "Updated", job.report)
+        return _report.finish(self, Message("Updated"), job.report)
