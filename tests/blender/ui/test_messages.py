@@ -54,7 +54,7 @@ def test_messages_are_found():
         "A job is running: wait or cancel it",
         "Starting",
         "Select the mesh of a character first",
-        "The vertex groups are hard: only a model says how probable a segment is (Apply to Selected)",
+        "The vertex groups are hard: only a model gives the probabilities of soft ones (Apply to Selected)",
         "curve",
     } <= TEMPLATES.keys()
 
