@@ -217,17 +217,27 @@ def _block_lanczos(
         complete_space = size + width > largest
         if complete_space or size >= next_check:
             next_check *= NEXT_CHECK
-            inverses, weights = np.linalg.eigh(projected)
-            ritz = shift + 1 / inverses
-            lowest = np.argsort(np.where(ritz > 0, ritz, np.inf), kind="stable")[:count]
-            weights = np.ascontiguousarray(weights[:, lowest])
-            # The residual of a Ritz pair is its part in the next block.
-            residuals = np.linalg.norm(coupling @ weights[-width:], axis=0)
-            missing = factor.n_negative - known.shape[1] - np.count_nonzero(ritz[lowest] < shift)
+            values, weights, converged = _lowest_ritz_pairs(projected, coupling, shift, count)
+            missing = factor.n_negative - known.shape[1] - np.count_nonzero(values < shift)
             found_all = missing <= 0 or size > LAST_CHECK * count
-            converged = (residuals <= LANCZOS_TOLERANCE * np.abs(inverses[lowest])).all()
             if complete_space or (found_all and converged):
-                return ritz[lowest], basis @ weights
+                return values, basis @ weights
+
+
+def _lowest_ritz_pairs(
+    projected: FloatArray, coupling: FloatArray, shift: float, count: int
+) -> tuple[FloatArray, FloatArray, bool]:
+    """The lowest positive Ritz values of A, the weights of their vectors in the basis, and whether they converged.
+
+    `projected` is the inverse of A − shift in the basis, `coupling` its part between the last block and the next one.
+    """
+    inverses, weights = np.linalg.eigh(projected)
+    ritz = shift + 1 / inverses
+    lowest = np.argsort(np.where(ritz > 0, ritz, np.inf), kind="stable")[:count]
+    weights = np.ascontiguousarray(weights[:, lowest])
+    # The residual of a Ritz pair is its part in the next block.
+    residuals = np.linalg.norm(coupling @ weights[-len(coupling) :], axis=0)
+    return ritz[lowest], weights, bool((residuals <= LANCZOS_TOLERANCE * np.abs(inverses[lowest])).all())
 
 
 def _polish(
