@@ -100,7 +100,7 @@ def sources():
     """The modules whose texts can be seen in the window."""
     for part in ("core", "blender"):
         for path in sorted((PACKAGE / part).rglob("*.py")):
-            if not TERMINAL & set(path.relative_to(PACKAGE).parts):
+            if path.name != "message.py" and not TERMINAL & set(path.relative_to(PACKAGE).parts):
                 yield Source(path)
 
 
@@ -180,15 +180,17 @@ def is_sentence(text):
 def sentences_made_on_the_spot():
     """(place, f-string) of all f-strings that read like a sentence, wherever they go to."""
     for source in SOURCES:
-        internal = {
-            part
-            for node in ast.walk(source.tree)
-            if isinstance(node, ast.Call) and name_of(node.func) in INTERNAL
-            for part in ast.walk(node)
-        }
+        internal = {part for node in ast.walk(source.tree) if is_internal(node) for part in ast.walk(node)}
         for node in ast.walk(source.tree):
             if isinstance(node, ast.JoinedStr) and node not in internal and is_sentence(literals(node)):
                 yield f"{source.path.relative_to(PACKAGE)}:{node.lineno}", ast.unparse(node)
+
+
+def is_internal(node):
+    """Whether an error of `INTERNAL` is made, or what Python shows of an object."""
+    if isinstance(node, ast.FunctionDef):
+        return node.name == "__repr__"
+    return isinstance(node, ast.Call) and name_of(node.func) in INTERNAL
 
 
 def literals(node):

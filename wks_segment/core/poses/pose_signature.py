@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..mesh.surface import Surface
 from ..mesh.triangle_mesh import FloatArray, TriangleMesh
+from ..message import Message
 from ..spectral.intrinsic_delaunay import Laplacian
 
 _SURFACE_MAPS = ("vertex_of", "face_of", "welded_faces")
@@ -59,7 +60,12 @@ class PoseSignature:
         )  # fmt: skip
         signature = arrays["signature"]
         if signature.ndim != 2 or len(signature) != surface.n_vertices:
-            raise ValueError(f"the signature has the shape {signature.shape}, for {surface.n_vertices} vertices")
+            raise ValueError(
+                Message(
+                    "the signature has the shape {shape}, for {n_vertices} vertices",
+                    shape=signature.shape, n_vertices=surface.n_vertices,
+                )
+            )  # fmt: skip
         return cls(
             Surface(original, surface, *(arrays[name] for name in _SURFACE_MAPS)),
             signature,
