@@ -1,4 +1,4 @@
-"""Whatever is in a model file: a model that works, or a ModelFileError. `make fuzz` tries thousands."""
+"""Damaged model files give a model that works, or a ModelFileError. `make fuzz` tries thousands of them."""
 
 import json
 import time
@@ -38,7 +38,7 @@ def texts(described):
 
 
 def places(content, path=()):
-    """The way to every value in it."""
+    """Path to every value in nested content."""
     yield path
     inner = content.items() if isinstance(content, dict) else enumerate(content) if isinstance(content, list) else ()
     for key, value in inner:
@@ -52,7 +52,7 @@ def replaced(content, path, change):
 
 
 def edited(draw, text):
-    """Some values taken out or replaced by what no one expects there."""
+    """The text with some values removed or replaced by unexpected ones."""
     content = json.loads(text)
     for _ in range(draw(st.integers(1, 3))):
         path = draw(st.sampled_from(list(places(content))[1:]))
@@ -104,7 +104,7 @@ def test_a_model_or_a_reason_within_a_second_and_without_much_memory(texts, desc
         model = None
     seconds, peak = time.process_time() - start, tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert seconds < 5  # a second, but for the tracing
+    assert seconds < 5  # one second without the tracing of memory
     assert peak < 60e6 + 40 * len(content)
     if model is None:
         count("model file", [name], "refused")
@@ -112,7 +112,7 @@ def test_a_model_or_a_reason_within_a_second_and_without_much_memory(texts, desc
     try:
         posteriors = model.predict_proba(described)
     except ValueError as error:
-        assert "energies" in str(error)  # of another size than the signature at hand, if whole
+        assert "energies" in str(error)  # a valid model with another number of energies than the signature
         count("model file", [name], "of another size")
         return
     np.testing.assert_allclose(posteriors.sum(axis=1), 1, atol=1e-5)

@@ -79,7 +79,7 @@ def test_a_binary_file_is_refused(tmp_path):
 def test_a_huge_file_is_refused_before_it_is_read(tmp_path):
     path = tmp_path / "model.json"
     with path.open("wb") as file:
-        file.truncate(2**40)  # a sparse file: a terabyte by its size, nothing on the disk
+        file.truncate(2**40)  # a sparse file of one terabyte, which takes no space on the disk
     with pytest.raises(ModelFileError, match="too large"):
         PoseSegmentation.load(path)
 

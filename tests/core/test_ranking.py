@@ -1,4 +1,4 @@
-"""Which model fits: comparable between settings, and how sure."""
+"""Rankings of models: comparable between settings, with a verdict."""
 
 import json
 
@@ -17,7 +17,7 @@ STRETCHED = np.array([1.0, 1.0, 4.0])
 
 
 def stretched(bend):
-    """Another class of shapes."""
+    """Shape of another class."""
     mesh = creature(bend, 3)
     return TriangleMesh(mesh.vertices * STRETCHED, mesh.faces)
 
@@ -36,7 +36,7 @@ def ranked(models, mesh):
 
 
 @pytest.mark.parametrize("kind", [0, 1])
-def test_the_model_of_the_class_is_first(models, kind):
+def test_model_of_the_class_is_first(models, kind):
     found = ranked(models, list(CLASSES.values())[kind](0.45))
     assert [place.index for place in found.ranks] == [kind, 1 - kind]
     assert found.verdict == "sure"
@@ -52,8 +52,8 @@ def test_the_model_of_the_class_is_first(models, kind):
     ],
     ids=str,
 )  # fmt: skip
-def test_models_of_other_settings_are_comparable(models, other):
-    """Whichever of the classes has the other settings, each shape goes to its own."""
+def test_models_with_different_settings_are_comparable(models, other):
+    """Each shape is assigned to its class, whichever class has the other settings."""
     makers = list(CLASSES.values())
     for kind, make in enumerate(makers):
         mixed = list(models)
@@ -61,18 +61,18 @@ def test_models_of_other_settings_are_comparable(models, other):
         assert [ranked(mixed, of(0.45)).best.index for of in makers] == [0, 1]
 
 
-def test_a_shape_of_no_class_fits_nothing(models):
+def test_shape_of_no_class_fits_no_model(models):
     assert ranked(models, icosphere(3)).verdict == "nothing fits"
 
 
-def test_alike_models_leave_it_unsure(models):
+def test_verdict_is_unsure_between_equal_models(models):
     found = ranked([models[0], models[0]], creature(0.45, 3))
     assert found.verdict == "unsure"
     assert found.best.probability == pytest.approx(0.5)
     assert [place.index for place in found.ranks] == [0, 1]
 
 
-def test_a_model_alone_is_sure_as_long_as_it_fits(models):
+def test_verdict_on_a_single_model_is_sure_if_it_fits(models):
     assert ranked(models[:1], creature(0.45, 3)).verdict == "sure"
     assert ranked(models[:1], icosphere(3)).verdict == "nothing fits"
 
@@ -85,14 +85,14 @@ def test_usual_scores_are_near_those_of_unseen_poses(models):
         assert model.usual_scores_.mean() < learned
 
 
-def test_one_learned_pose_has_its_own_score():
+def test_usual_score_of_a_single_pose_is_its_score():
     mesh = creature(0.0, 3)
     model = PoseSegmentation(**QUICK).fit([mesh])
     assert model.usual_scores_ == pytest.approx([model.comparable_score(mesh)], abs=1e-5)
 
 
 @pytest.mark.parametrize("scores", [None, []])
-def test_usual_scores_are_in_the_file_and_must_be(models, scores):
+def test_usual_scores_are_saved_and_required(models, scores):
     text = models[0].to_json()
     np.testing.assert_array_equal(PoseSegmentation.from_json(text).usual_scores_, models[0].usual_scores_)
     content = json.loads(text) | {"usual_scores": scores}
@@ -100,15 +100,15 @@ def test_usual_scores_are_in_the_file_and_must_be(models, scores):
         PoseSegmentation.from_json(json.dumps(content))
 
 
-def test_scores_change_no_label(models):
-    """`score` is what scripts rely on: the mean over all of the area."""
+def test_score_is_the_mean_over_all_of_the_area(models):
+    """Unlike `comparable_score`, which leaves out the least likely tenth."""
     model, mesh = models[0], creature(0.45, 3)
     pose = model.describe(mesh)
     assert model.score(pose) != pytest.approx(model.comparable_score(pose))
     assert model.score(mesh) == pytest.approx(model.score(pose))
 
 
-def test_the_least_likely_tenth_does_not_count():
+def test_least_likely_tenth_does_not_count():
     shares = np.full(20, 0.05)
     values = np.arange(20.0)
     values[:2] = -1e9
@@ -117,7 +117,7 @@ def test_the_least_likely_tenth_does_not_count():
     assert likely_mean(np.array([-4.0, 1.0]), np.array([0.2, 0.8])) == pytest.approx((-4 * 0.1 + 0.8) / 0.9)
 
 
-def test_what_is_left_out_is_less_likely():
+def test_left_out_samples_are_less_likely():
     generator = np.random.default_rng(0)
     group = np.repeat(np.arange(3), 100)
     samples = generator.standard_normal((300, 4)) + group[:, None]
@@ -128,31 +128,31 @@ def test_what_is_left_out_is_less_likely():
         assert without.mean() < mixture.log_likelihoods(samples).mean()
 
 
-def test_far_below_the_usual_is_another_class():
+def test_score_far_below_the_usual_is_another_class():
     assert least_usual(np.array([2.0])) == pytest.approx(1.5)
     assert least_usual(np.array([1.0, 2.0, 3.0])) == pytest.approx(2.0 - 3.0)
     assert ranking_of(np.array([1.0, 1.2]), [np.array([1.0]), np.array([2.0])], "aa").verdict == "nothing fits"
 
 
-def test_scores_count_as_they_are_between_models_of_the_same_settings():
+def test_models_with_the_same_settings_are_compared_by_score_alone():
     usual = [np.array([1.0]), np.array([2.0])]
     assert ranking_of(np.array([1.1, 1.9]), usual, "aa").best.index == 1
     assert ranking_of(np.array([1.1, 1.9]), usual, "ab").best.index == 0
 
 
-def test_models_are_described_together_where_they_can_be(models):
+def test_models_that_share_signatures_are_grouped(models):
     more = [*models, PoseSegmentation(n_energies=7), PoseSegmentation(**QUICK, pieces="separate")]
     assert described_alike(more) == [[0, 1], [2], [3]]
 
 
-def test_nothing_to_rank_is_refused(models):
+def test_ranking_without_models_or_poses_is_refused(models):
     with pytest.raises(ValueError, match="there are 0 models"):
         rank([], [])
     with pytest.raises(ValueError, match="there are 2 models, and poses for 1"):
         rank(models, [[models[0].describe(creature(0.0, 3))], []])
 
 
-def test_queries_of_all_classes_are_counted(models):
+def test_retrieval_counts_queries_of_all_classes(models):
     queries = {name: [models[0].describe(make(bend)) for bend in (0.15, 0.45)] for name, make in CLASSES.items()}
     found = retrieve(dict(zip(CLASSES, models, strict=True)), queries)
     np.testing.assert_array_equal(found.confusion, [[2, 0], [0, 2]])
@@ -160,6 +160,6 @@ def test_queries_of_all_classes_are_counted(models):
     assert sum(map(sum, found.verdicts.values())) == 4
 
 
-def test_learned_shapes_are_spread():
+def test_learned_shapes_are_spread_evenly():
     assert spread_evenly(20, 5) == [0, 4, 8, 12, 16]
     assert spread_evenly(8, 5) == [0, 1, 3, 4, 6]

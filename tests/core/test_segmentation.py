@@ -35,7 +35,7 @@ def test_labels_do_not_depend_on_place_size_or_order_of_vertices(model):
     assert (model.predict(moved) == model.predict(pose)[order]).mean() > 0.999
 
 
-def test_posteriors_are_probabilities_and_the_label_is_the_largest(model):
+def test_posteriors_are_probabilities_and_the_label_has_the_highest(model):
     described = model.describe(POSES[0])
     posteriors = model.predict_proba(described)
     assert posteriors.shape == (POSES[0].n_vertices, 4)
@@ -43,7 +43,7 @@ def test_posteriors_are_probabilities_and_the_label_is_the_largest(model):
     np.testing.assert_array_equal(model.predict(described), posteriors.argmax(axis=1))
 
 
-def test_soft_posteriors_are_probabilities_that_change_less_from_vertex_to_vertex(model):
+def test_soft_posteriors_are_probabilities_and_smoother(model):
     described = model.describe(POSES[0])
     plain, soft = model.predict_proba(described), model.predict_soft(described)
     assert soft.shape == plain.shape
@@ -55,14 +55,14 @@ def test_soft_posteriors_are_probabilities_that_change_less_from_vertex_to_verte
     assert (soft.argmax(axis=1) == plain.argmax(axis=1)).mean() > 0.9
 
 
-def test_soft_posteriors_without_smoothness_are_those_of_the_signature(model):
+def test_soft_posteriors_without_smoothness_equal_the_posteriors(model):
     described = model.describe(POSES[0])
     rough = PoseSegmentation.from_json(model.to_json())
     rough.smoothness = 0.0
     np.testing.assert_allclose(rough.predict_soft(described), model.predict_proba(described), rtol=1e-9)
 
 
-def test_parts_are_connected_and_not_too_small(model):
+def test_regions_are_connected_and_not_too_small(model):
     described = model.describe(POSES[2])
     regions = model.segment_regions(described)
     mesh = POSES[2]
@@ -72,7 +72,7 @@ def test_parts_are_connected_and_not_too_small(model):
     assert connected_regions(regions, adjacency).max() + 1 == len(names)
 
 
-def test_with_the_papers_setting_regions_are_connected_parts_of_the_components():
+def test_with_the_paper_preset_regions_are_connected_regions_of_components():
     mesh = POSES[0]
     model = PoseSegmentation(**SMALL, preset="paper").fit([mesh])
     adjacency = FaceAdjacency.of(mesh.faces, mesh.vertices)
@@ -80,14 +80,14 @@ def test_with_the_papers_setting_regions_are_connected_parts_of_the_components()
     np.testing.assert_array_equal(model.segment_regions(mesh), expected)
 
 
-def test_the_thin_end_and_the_body_are_different_parts(model):
+def test_limb_and_body_are_different_segments(model):
     labels = model.predict(POSES[0])
     tip = labels[np.argmax(POSES[0].vertices[:, 0])]
     body = labels[np.argmin(np.abs(POSES[0].vertices - (0, 0, -1)).sum(axis=1))]
     assert tip != body
 
 
-def test_a_query_scores_highest_under_the_model_of_its_own_class(model):
+def test_shape_scores_highest_with_the_model_of_its_class(model):
     def stretched(bend):
         ball = creature(bend, 3)
         return TriangleMesh(ball.vertices * (1, 0.4, 2.5), ball.faces)
@@ -99,7 +99,7 @@ def test_a_query_scores_highest_under_the_model_of_its_own_class(model):
 
 @pytest.mark.parametrize("covariance_type", ["auto", "shared", "diag", "spherical", "tied", "full"])
 @pytest.mark.parametrize("scaling", ["log", "raw"])
-def test_every_setting_learns_and_survives_saving(tmp_path, model, covariance_type, scaling):
+def test_every_setting_can_be_learned_and_saved(tmp_path, model, covariance_type, scaling):
     described = [model.describe(pose) for pose in POSES[:2]]
     fitted = PoseSegmentation(**SMALL, covariance_type=covariance_type, scaling=scaling).fit(described)
     fitted.save(tmp_path / "model.json")
@@ -114,12 +114,12 @@ def test_the_same_seed_gives_the_same_labels(model):
     np.testing.assert_array_equal(again.predict(POSES[0]), model.predict(POSES[0]))
 
 
-def test_seams_do_not_matter_and_each_copy_of_a_vertex_gets_the_label(model):
+def test_copies_of_a_vertex_along_seams_get_the_same_label(model):
     soup = split_at_every_corner(POSES[0])
     np.testing.assert_array_equal(model.predict(soup), model.predict(POSES[0])[POSES[0].faces.ravel()])
 
 
-def test_a_coarse_mesh_is_refined_inside_and_labeled_as_it_is():
+def test_coarse_mesh_is_refined_internally_and_labeled_on_its_own_vertices():
     coarse = [creature(bend, 2) for bend in (0.0, 0.6)]
     fitted = PoseSegmentation(3, n_eigenpairs=100).fit(coarse)
     assert fitted.describe(coarse[0]).surface.mesh.n_vertices >= 1000
@@ -127,7 +127,7 @@ def test_a_coarse_mesh_is_refined_inside_and_labeled_as_it_is():
     assert fitted.segment_faces(coarse[0]).shape == (coarse[0].n_faces,)
 
 
-def test_loose_parts_all_get_labels_and_do_not_break_the_body():
+def test_islands_get_labels_and_do_not_disturb_the_body():
     def with_eyes(bend):
         eyes = [TriangleMesh(0.1 * icosphere(1).vertices + place, icosphere(1).faces) for place in (2.0, -2.0)]
         return together(creature(bend), *eyes)
@@ -140,8 +140,8 @@ def test_loose_parts_all_get_labels_and_do_not_break_the_body():
     assert set(fitted.segment_faces(with_eyes(0.3))) <= set(range(4))
 
 
-def test_polygons_of_several_triangles_are_labeled_as_wholes_over_all_poses(model):
-    # Each triangle of the coarse mesh is a polygon of four of the fine one.
+def test_polygons_of_several_triangles_are_labeled_over_all_poses(model):
+    # Each triangle of the coarse mesh is a polygon of four triangles of the fine mesh.
     coarse = [creature(bend, 3) for bend in (0.0, 0.6)]
     fine = [prepare_surface(mesh, 2000) for mesh in coarse]
     labels = model.segment_polygons([surface.mesh for surface in fine], [surface.face_of for surface in fine])
@@ -168,7 +168,7 @@ class StopError(Exception):
 
 
 @pytest.mark.parametrize("stage", ["pose", "mixture", "parts", "regions"])
-def test_an_error_from_progress_ends_learning_in_the_middle_of_a_stage(stage):
+def test_error_from_progress_ends_a_fit_within_a_stage(stage):
     calls = []
 
     def progress(current, share):
@@ -184,7 +184,7 @@ def test_an_error_from_progress_ends_learning_in_the_middle_of_a_stage(stage):
     assert not hasattr(learner, "regions_") or learner.regions_ is None
 
 
-def test_an_error_from_progress_ends_labeling(model):
+def test_error_from_progress_ends_labeling(model):
     described = [model.describe(mesh) for mesh in POSES]
     shares = []
 
@@ -212,17 +212,17 @@ def test_an_error_from_progress_ends_labeling(model):
         ({"n_segments": 100_000}, "n_segments is 100000, but the poses have only"),
     ],
 )
-def test_bad_parameters_are_named(change, message):
+def test_bad_parameter_is_named_in_the_error(change, message):
     with pytest.raises(ValueError, match=message):
         PoseSegmentation(**{**SMALL, **change}).fit([POSES[0]])
 
 
-def test_no_pose_is_an_error():
+def test_fit_without_a_pose_is_refused():
     with pytest.raises(ValueError, match="no pose to learn from"):
         PoseSegmentation().fit([])
 
 
-def test_an_unfitted_model_says_so(tmp_path):
+def test_unfitted_model_is_refused(tmp_path):
     unfitted = PoseSegmentation(**SMALL)
     for use in (unfitted.predict, unfitted.score, unfitted.segment_faces):
         with pytest.raises(ValueError, match="not fitted"):
@@ -231,12 +231,12 @@ def test_an_unfitted_model_says_so(tmp_path):
         unfitted.save(tmp_path / "model.json")
 
 
-def test_something_else_than_a_mesh_is_named(model):
+def test_value_that_is_no_pose_is_refused(model):
     with pytest.raises(TypeError, match="must be a TriangleMesh or a PoseSignature, not list"):
         model.predict([1, 2, 3])
 
 
-def test_poses_described_side_by_side_are_those_described_one_by_one():
+def test_poses_described_in_parallel_equal_poses_described_one_by_one():
     model = PoseSegmentation(**SMALL)
     stages = []
     together_ = model.describe_all(POSES, progress=lambda stage, share: stages.append((stage, share)), workers=2)
@@ -248,7 +248,7 @@ def test_poses_described_side_by_side_are_those_described_one_by_one():
     assert stages[0][0] == "pose 1 of 3"
 
 
-def test_an_error_from_progress_ends_all_poses():
+def test_error_from_progress_ends_all_poses():
     class StopError(Exception):
         pass
 
@@ -260,8 +260,8 @@ def test_an_error_from_progress_ends_all_poses():
         PoseSegmentation(**SMALL).describe_all(POSES, progress=stop, workers=2)
 
 
-def test_a_pose_that_cannot_be_described_is_named():
-    # A needle whose short edge is none.
+def test_pose_that_cannot_be_described_is_named_in_the_error():
+    # A triangle with an edge that is too short.
     bad = TriangleMesh([(0, 0, 0), (1, 0, 0), (1, 1e-8, 0)], [(0, 1, 2)])
     model = PoseSegmentation(n_energies=1)
     with pytest.raises(ValueError, match="n_energies"):

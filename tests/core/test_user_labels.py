@@ -1,4 +1,4 @@
-"""What a user notes on parts is kept with the model; what is damaged is refused by its name."""
+"""Notes of a user on parts are kept with the model; damaged notes are refused with the name of the field."""
 
 import json
 
@@ -15,12 +15,12 @@ def text():
     return PoseSegmentation(3, n_eigenpairs=20, n_energies=12).fit([creature(0.0, 3)]).to_json()
 
 
-def test_a_new_model_has_none_and_its_file_says_nothing_of_them(text):
+def test_new_model_has_no_notes_and_none_in_its_file(text):
     assert PoseSegmentation.from_json(text).part_notes_ == PartNotes()
     assert not {"part_names", "part_colors", "joined_parts"} & set(json.loads(text))
 
 
-def test_notes_go_to_a_file_and_come_back(text, tmp_path):
+def test_notes_are_saved_and_loaded(text, tmp_path):
     model = PoseSegmentation.from_json(text)
     model.part_notes_ = NOTES
     model.save(tmp_path / "model.json")
@@ -30,7 +30,7 @@ def test_notes_go_to_a_file_and_come_back(text, tmp_path):
     assert loaded.to_json() == model.to_json()
 
 
-def test_learning_again_forgets_them(text):
+def test_new_fit_drops_the_notes(text):
     model = PoseSegmentation.from_json(text)
     model.part_notes_ = NOTES
     assert model.fit([creature(0.0, 3)]).part_notes_ == PartNotes()

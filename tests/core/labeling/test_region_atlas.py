@@ -10,7 +10,7 @@ from wks_segment.core.labeling.traits import Traits
 
 
 def limb(name, subdivisions=4, radius=0.15):
-    """Faces at the end of a limb, up to an angle from its axis on the sphere that it was pulled out of."""
+    """Faces at the end of a limb: within an angle from its axis on the sphere that the figure is made from."""
     sphere = icosphere(subdivisions)
     axis = np.array(LIMBS[name][0]) / np.linalg.norm(LIMBS[name][0])
     return np.arccos(np.clip(sphere.vertices[sphere.faces].mean(axis=1) @ axis, -1, 1)) < radius
@@ -33,7 +33,7 @@ def model():
     return PoseSegmentation(6, n_eigenpairs=100, n_energies=60).fit(poses)
 
 
-def test_left_and_right_are_two_regions_and_the_same_two_in_unseen_poses(model, usual):
+def test_left_and_right_are_two_regions_with_the_same_names_in_unseen_poses(model, usual):
     for left, right in ((0.4, -0.4), (-0.5, 0.5), (0.0, 0.7)):
         mesh = figure(left, right)
         found = model.segment_regions(mesh)
@@ -44,7 +44,7 @@ def test_left_and_right_are_two_regions_and_the_same_two_in_unseen_poses(model, 
             assert names[0] != names[1]
 
 
-def test_names_are_the_same_on_another_meshing_in_another_place_and_inside_out(model, usual):
+def test_names_are_the_same_on_another_meshing_elsewhere_and_inside_out(model, usual):
     fine = figure(0.3, -0.2, 5)
     turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
     order = np.random.default_rng(0).permutation(fine.n_vertices)
@@ -54,7 +54,7 @@ def test_names_are_the_same_on_another_meshing_in_another_place_and_inside_out(m
         assert name_of(found, limb(one, 5)) == name_of(usual, limb(one))
 
 
-def test_a_mirrored_body_has_its_left_where_the_other_had_its_right(model):
+def test_mirrored_body_has_left_and_right_exchanged(model):
     usual = model.segment_regions(figure(0.4, 0.0))
     mesh = figure(0.4, 0.0)
     mirrored = model.segment_regions(TriangleMesh(mesh.vertices * (-1, 1, 1), mesh.faces[:, ::-1]))
@@ -62,7 +62,7 @@ def test_a_mirrored_body_has_its_left_where_the_other_had_its_right(model):
     assert name_of(mirrored, limb("right leg")) == name_of(usual, limb("left leg"))
 
 
-def test_left_is_where_x_points(model, usual):
+def test_left_is_in_the_direction_of_x(model, usual):
     names, side = usual, model.regions_.side
     for one in ("arm", "leg"):
         assert side[name_of(names, limb(f"left {one}"))] == 1
@@ -70,7 +70,7 @@ def test_left_is_where_x_points(model, usual):
     assert side[name_of(names, limb("head"))] == 0
 
 
-def test_sides_are_told_at_rest_if_that_is_given():
+def test_rest_pose_tells_left_from_right():
     turned = [TriangleMesh(mesh.vertices * (-1, -1, 1), mesh.faces) for mesh in (figure(0.2, 0.1), figure(0.5, 0.0))]
     fitted = PoseSegmentation(6, n_eigenpairs=100, n_energies=60).fit(turned, rest=figure())
     names = fitted.segment_regions(turned[0])
@@ -79,7 +79,7 @@ def test_sides_are_told_at_rest_if_that_is_given():
         PoseSegmentation(6, n_eigenpairs=100, n_energies=60).fit(turned, rest=figure(subdivisions=3))
 
 
-def test_polygons_of_parts_on_both_sides_have_a_side(model):
+def test_polygons_on_both_sides_have_a_side(model):
     mesh = figure(0.3, 0.1)
     polygon_of = np.arange(mesh.n_faces)
     labels = model.segment_polygons([mesh], [polygon_of])
@@ -90,7 +90,7 @@ def test_polygons_of_parts_on_both_sides_have_a_side(model):
     assert (side[limb("head")] == 0).all()
 
 
-def test_poses_vote_on_the_sides_of_their_mesh(model, monkeypatch):
+def test_poses_vote_on_the_sides_of_a_mesh(model, monkeypatch):
     mesh = figure(subdivisions=3)
     given = {0.0: [1, 1, 1, 0, -1, 1], 0.1: [1, 1, 0, 0, 1, 1], 0.2: [1, -1, 0, 0, -1, 0], 0.3: [1, 1, 0, 0, -1, 0]}
     poses = [TriangleMesh(mesh.vertices + (0, 0, height), mesh.faces) for height in given]
@@ -100,7 +100,7 @@ def test_poses_vote_on_the_sides_of_their_mesh(model, monkeypatch):
     assert found.tolist() == [1, 1, 0, 0, -1, 0]
 
 
-def test_of_many_poses_some_say_what_is_left_and_right(model):
+def test_some_of_many_poses_vote_on_sides(model):
     poses = [figure(0.3, 0.1 * i, 3) for i in range(8)]
     polygons = [np.arange(poses[0].n_faces)] * 8
     labels, seen = model.segment_polygons(poses, polygons), []
@@ -112,8 +112,8 @@ def test_of_many_poses_some_say_what_is_left_and_right(model):
         assert (side[limb(f"right {one}", 3)] == -1).all()
 
 
-def test_poses_in_other_triangles_say_together_what_is_left_and_right(model):
-    """As a polygon may be cut along another diagonal in each pose."""
+def test_poses_with_different_triangles_vote_together(model):
+    """A polygon may be triangulated differently in each pose."""
     poses = [figure(0.3, 0.1), figure(0.0, 0.3)]
     order = np.random.default_rng(0).permutation(poses[1].n_faces)
     poses[1] = TriangleMesh(poses[1].vertices, poses[1].faces[order])
@@ -131,8 +131,8 @@ def test_polygons_must_fit_the_poses(model):
         model.polygon_sides([mesh], [], np.zeros(6, int))
 
 
-def test_a_part_in_the_middle_has_no_side_however_the_sides_are_bent(model):
-    """The tail is about as large as a foot and of the same segment, and one foot is nearer to it than the other."""
+def test_region_in_the_middle_has_no_side_in_bent_poses(model):
+    """The tail has about the size and the segment of a foot, and is nearer to one foot than to the other."""
     for left, right in ((0.5, -0.3), (-0.3, 0.5), (0.0, 0.6)):
         mesh = figure(left, right)
         ends = {"left leg": limb("left leg"), "right leg": limb("right leg"), "tail": limb("tail", radius=0.22)}
@@ -142,7 +142,7 @@ def test_a_part_in_the_middle_has_no_side_however_the_sides_are_bent(model):
         assert found == {"left leg": [1], "right leg": [-1], "tail": [0]}
 
 
-def test_a_saved_model_gives_the_same_names(model, tmp_path):
+def test_saved_model_gives_the_same_names(model, tmp_path):
     model.save(tmp_path / "model.json")
     mesh = figure(0.1, 0.5)
     np.testing.assert_array_equal(
@@ -150,7 +150,7 @@ def test_a_saved_model_gives_the_same_names(model, tmp_path):
     )
 
 
-def test_what_was_not_learned_is_numbered_on(model):
+def test_new_regions_have_higher_numbers_than_learned_ones(model):
     mesh = figure()
     known = len(model.regions_.side)
     regions = model.segment_regions(mesh, min_share=0.0)
@@ -159,22 +159,22 @@ def test_what_was_not_learned_is_numbered_on(model):
     assert (areas[known:] > 0).all()
 
 
-def test_sides_need_one_of_the_same_segment_opposite():
+def test_side_needs_a_counterpart_of_the_same_segment():
     centers = np.array([(1, 0, 0), (-1, 0.1, 0), (0.01, 0, 1), (0.9, 0, -2), (-0.9, 0, -2), (2, 0, 3)])
     none = np.arange(6)
     assert region_sides(centers, np.array([0, 0, 1, 2, 2, 3]), none).tolist() == [1, -1, 0, 1, -1, 0]
     assert region_sides(centers, np.array([0, 1, 1, 2, 2, 3]), none).tolist() == [0, 0, 0, 1, -1, 0]
 
 
-def test_bent_sides_are_told_from_which_is_which_in_the_mirror_image():
-    """Four limbs of one segment that have swung to and fro: mirroring brings none to the one opposite."""
+def test_sides_of_a_bent_pose_follow_from_its_mirror_image():
+    """Mirroring brings none of the four limbs close to its counterpart, because they have swung back and forth."""
     centers = np.array([(0.5, 1, 0), (-0.1, 0, 0), (0.4, -2, 0), (-0.2, -1, 0), (0.0, 9, 0)])
     segment = np.zeros(5, dtype=int)
     assert region_sides(centers, segment, np.arange(5)).tolist() != [1, -1, 1, -1, 0]
     assert region_sides(centers, segment, np.array([1, 0, 3, 2, 5])).tolist() == [1, -1, 1, -1, 0]
 
 
-def test_left_is_told_from_a_bent_pose_alone():
+def test_sides_are_learned_from_bent_poses_alone():
     poses = [figure(0.7, -0.2), figure(0.2, 0.4)]
     model = PoseSegmentation(6, n_eigenpairs=100, n_energies=60).fit(poses)
     regions = model.segment_regions(poses[0])
@@ -182,8 +182,8 @@ def test_left_is_told_from_a_bent_pose_alone():
         assert {int(model.regions_.side[name_of(regions, limb(one))]) for one in limbs} == {side}
 
 
-def test_in_poses_of_one_mesh_the_order_says_which_region_is_which(model):
-    """In the second pose left and right look as if they had changed places."""
+def test_regions_of_one_mesh_are_matched_by_their_order(model):
+    """In the second pose the traits of left and right are exchanged."""
     known = model.regions_.traits
     order = np.arange(len(known.segment))
     left = int(np.argmax(model.regions_.side == 1))

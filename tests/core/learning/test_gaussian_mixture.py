@@ -22,7 +22,7 @@ def drawn(n=6000, spread=(0.8, 0.8, 0.8), seed=0):
 def test_a_mixture_is_recovered_from_its_own_samples(covariance_type):
     samples, component = drawn()
     mixture = fit_mixture(samples, np.ones(len(samples)), 3, covariance_type)
-    # Components come in the order of their means' mean, in which MEANS is written.
+    # Components are sorted by the mean of their means, like MEANS.
     np.testing.assert_allclose(mixture.means, MEANS, atol=0.08)
     np.testing.assert_allclose(mixture.weights, SHARES, atol=0.03)
     assert (mixture.posteriors(samples).argmax(axis=1) == component).mean() > 0.99
@@ -55,7 +55,7 @@ def test_likelihood_is_that_of_the_normal_density(covariance_type):
     np.testing.assert_allclose(mixture.posteriors(samples).sum(axis=1), 1.0)
 
 
-def test_a_sample_of_double_weight_counts_like_two():
+def test_sample_with_double_weight_counts_like_two():
     samples, _ = drawn(500)
     weights = np.where(samples[:, 0] > 0, 2.0, 1.0)
     weighted = fit_mixture(samples, weights, 3, "diag")
@@ -66,8 +66,8 @@ def test_a_sample_of_double_weight_counts_like_two():
 
 
 @pytest.mark.parametrize("covariance_type", TYPES)
-def test_it_cannot_collapse_onto_equal_samples(covariance_type):
-    # Three places only, in 40 dimensions of which one varies: every plain covariance is singular.
+def test_component_cannot_collapse_onto_equal_samples(covariance_type):
+    # Three distinct samples, which differ in one of 40 dimensions: every covariance without a floor is singular.
     samples = np.zeros((300, 40))
     samples[:, 7] = np.repeat([0.0, 1.0, 2.0], 100)
     mixture = fit_mixture(samples, np.ones(300), 3, covariance_type)

@@ -5,7 +5,7 @@ from shapes import creature
 from wks_segment.core import PoseSegmentation, prepare_surface
 from wks_segment.core.learning.merge_tree import Contacts, Grouping, PoseGeometry
 
-# A row of four components of equal area; between the second and the third there is hardly any border.
+# A row of four components with equal areas; the second and the third have hardly any border.
 ROW = np.zeros((4, 4))
 ROW[[0, 1, 2], [1, 2, 3]] = 1.0, 0.01, 0.8
 ROW += ROW.T
@@ -13,13 +13,13 @@ EVEN = np.full(4, 0.25)
 
 
 def overlaps(areas, shared=0.02):
-    """Posteriors that are sure but for a little between neighbors in the row."""
+    """Overlaps of nearly certain posteriors: only neighbors in the row share a little."""
     table = np.diag(areas - shared)
     table[[0, 1, 2], [1, 2, 3]] = shared / 2
     return table + np.triu(table, 1).T
 
 
-def test_what_a_long_border_holds_together_is_joined_first():
+def test_components_with_a_long_border_are_joined_first():
     grouping = Grouping.of(Contacts(ROW, EVEN, overlaps(EVEN)))
     assert grouping.pairs.tolist() == [[0, 1], [2, 3], [0, 2]]
     assert grouping.groups(4).tolist() == [0, 3, 1, 2]
@@ -28,19 +28,19 @@ def test_what_a_long_border_holds_together_is_joined_first():
     assert grouping.groups(1).tolist() == [0, 0, 0, 0]
 
 
-def test_one_group_more_splits_off_the_last_number_and_leaves_the_others():
+def test_one_group_more_splits_one_and_keeps_the_numbers_of_the_others():
     areas = np.array([0.1, 0.3, 0.4, 0.2])
     grouping = Grouping.of(Contacts(ROW, areas, overlaps(areas)))
     for count in (1, 2, 3):
         coarse, fine = grouping.groups(count), grouping.groups(count + 1)
         kept = fine < count
         np.testing.assert_array_equal(fine[kept], coarse[kept])
-        (split,) = set(coarse[~kept])  # what is split off was one group's, and less than half of it
+        (split,) = set(coarse[~kept])  # the new group is less than half of one old group
         assert areas[~kept].sum() <= areas[kept & (coarse == split)].sum()
 
 
-def test_the_sum_of_border_by_area_falls_by_the_best_join():
-    # By hand: joining i and j changes Σ border / area; the first join must change it most.
+def test_first_join_lowers_the_sum_of_border_by_area_most():
+    # Each join lowers Σ border / area; the first one must lower it most.
     def total(groups):
         table = np.eye(max(groups) + 1)[groups]
         borders = table.T @ ROW @ table
@@ -53,15 +53,15 @@ def test_the_sum_of_border_by_area_falls_by_the_best_join():
     assert (found[:, None] == found).tolist() == (np.array(best)[:, None] == best).tolist()
 
 
-def test_the_small_and_the_scattered_are_joined_before_others():
+def test_small_and_scattered_components_are_joined_first():
     areas = np.array([0.5, 0.25, 0.245, 0.005])
     assert Grouping.of(Contacts(ROW, areas, overlaps(areas, 0.001))).pairs[0].tolist() == [2, 3]
     scattered = np.array([False, False, True, False])
     assert 2 in Grouping.of(Contacts(ROW, EVEN, overlaps(EVEN)), scattered).pairs[0]
 
 
-def test_components_that_take_each_others_place_from_pose_to_pose_are_one_segment():
-    # Half of the faces belong to component 0 in one pose, to 3 in the other; the rest to 1 and to 2.
+def test_components_that_replace_each_other_between_poses_are_joined():
+    # Half of the faces belong to component 0 in one pose and to 3 in the other; the rest belong to 1 and 2.
     labels = np.array([[0] * 4 + [1, 1, 2, 2], [3] * 4 + [1, 1, 2, 2]])
     contacts = Contacts(ROW, EVEN, overlaps(EVEN)).with_changes(np.eye(4)[labels])
     expected = np.zeros((4, 4))
@@ -70,7 +70,7 @@ def test_components_that_take_each_others_place_from_pose_to_pose_are_one_segmen
     assert Grouping.of(contacts).pairs[0].tolist() == [0, 3]
 
 
-def test_what_touches_nothing_is_joined_by_overlap():
+def test_components_without_borders_are_joined_by_overlap():
     apart = np.zeros((3, 3))
     areas = np.full(3, 1 / 3)
     shared = np.diag(areas - 0.01)
@@ -78,7 +78,7 @@ def test_what_touches_nothing_is_joined_by_overlap():
     assert Grouping.of(Contacts(apart, areas, shared)).pairs[0].tolist() == [0, 2]
 
 
-def test_certainty_is_one_where_all_are_sure_and_none_where_sizes_are_all_that_is_known():
+def test_certainty_is_one_for_certain_faces_and_zero_by_chance():
     sure = Grouping.of(Contacts(ROW, EVEN, np.diag(EVEN)))
     np.testing.assert_allclose(sure.curve(), [0, 1, 1, 1])
     assert sure.best_number() == 4
@@ -86,15 +86,15 @@ def test_certainty_is_one_where_all_are_sure_and_none_where_sizes_are_all_that_i
     np.testing.assert_allclose(guessed.curve(), 0, atol=1e-12)
 
 
-def test_the_number_is_the_last_before_certainty_falls():
-    # Within each half nobody knows which; between the halves all are sure.
+def test_best_number_is_the_last_before_certainty_falls():
+    # Components of one half cannot be told apart; the halves can be with certainty.
     halves = np.kron(np.eye(2), np.full((2, 2), 0.125))
     grouping = Grouping.of(Contacts(ROW, EVEN, halves))
     np.testing.assert_allclose(grouping.certainties[[1, 3]], [1, 0.5])
     assert grouping.best_number() == 2
 
 
-def test_borders_are_measured_on_the_surface():
+def test_contacts_measure_borders_on_the_surface():
     surface = prepare_surface(creature(0.3, 4))
     geometry = PoseGeometry.of(surface)
     x = surface.original.vertices[surface.original.faces].mean(axis=1)[:, 0]
@@ -111,7 +111,7 @@ def poses():
     return [creature(bend, 4) for bend in (0.0, 0.4)]
 
 
-def test_the_number_of_segments_is_found(poses, tmp_path):
+def test_open_number_of_segments_is_the_best_number(poses, tmp_path):
     model = PoseSegmentation("auto", n_eigenpairs=60, n_energies=40).fit(poses)
     assert model.n_segments_ == model.grouping_.best_number()
     assert 2 <= model.n_segments_ <= 16
@@ -122,12 +122,12 @@ def test_the_number_of_segments_is_found(poses, tmp_path):
     np.testing.assert_array_equal(loaded.segment_faces(poses[1]), model.segment_faces(poses[1]))
 
 
-def test_another_number_needs_no_learning(poses):
+def test_other_number_of_segments_needs_no_fit(poses):
     model = PoseSegmentation(6, n_eigenpairs=60, n_energies=40).fit(poses)
     described = model.describe(poses[0])
     fine = model.predict_proba(described)
     model.n_segments = 3
-    # The three are unions of the six.
+    # The three segments are unions of the six.
     whole = model.predict_proba(described)
     unions = np.array(
         [[np.allclose(whole[:, j], fine[:, list(some)].sum(axis=1)) for some in _subsets(6)] for j in range(3)]
@@ -139,12 +139,12 @@ def _subsets(count):
     return [[i for i in range(count) if mask >> i & 1] for mask in range(1, 2**count)]
 
 
-def test_no_segment_is_lost_as_crumbs(poses):
+def test_no_segment_consists_of_small_regions_only(poses):
     model = PoseSegmentation(4, n_eigenpairs=30, n_energies=40).fit(poses)
     for pose in poses:
         assert len(np.unique(model.segment_faces(pose))) == 4
 
 
-def test_the_number_is_not_found_with_the_papers_setting(poses):
+def test_paper_preset_needs_a_number_of_segments(poses):
     with pytest.raises(ValueError, match="n_segments must be a number"):
         PoseSegmentation("auto", preset="paper").fit(poses)

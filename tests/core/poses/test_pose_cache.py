@@ -1,4 +1,4 @@
-"""Labels again, with other settings: the same as from the beginning, and another number of segments without a fit."""
+"""Relabeling with cached results gives the same labels; another number of segments needs no fit."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def model(described):
 
 
 def outcome(model, poses):
-    """All that a model says of poses."""
+    """All results of a model on poses."""
     labels = model.segment_polygons(poses, POLYGONS, 0.01)
     return [
         labels,
@@ -36,8 +36,8 @@ def outcome(model, poses):
     ]
 
 
-def test_labels_in_any_order_of_settings_are_those_from_the_beginning(model, described):
-    works = [Workpiece(pose) for pose in described]
+def test_cached_labels_equal_new_labels_in_any_order_of_settings(model, described):
+    workpieces = [Workpiece(pose) for pose in described]
     copies = {}
     for number, smoothness in ((6, 1.0), (3, 1.0), (3, 2.0), (9, 0.5), (6, 0.0), (6, 1.0), (3, 2.0)):
         if (number, smoothness) not in copies:
@@ -45,59 +45,59 @@ def test_labels_in_any_order_of_settings_are_those_from_the_beginning(model, des
             other.smoothness = smoothness
             copies[number, smoothness] = other, outcome(other, described)
         other, expected = copies[number, smoothness]
-        for again, anew in zip(outcome(other, works), expected, strict=True):
-            np.testing.assert_array_equal(again, anew)
+        for cached, new in zip(outcome(other, workpieces), expected, strict=True):
+            np.testing.assert_array_equal(cached, new)
 
 
-def test_marked_edges_and_the_smallest_part_count_again(model, described):
-    works = [Workpiece(pose) for pose in described]
+def test_marked_edges_and_min_share_are_not_cached(model, described):
+    workpieces = [Workpiece(pose) for pose in described]
     ring = POSES[0].faces[:, 0] // 40
     for marked in (None, np.stack([ring[:-1], ring[1:]], axis=1)):
         for share in (0.0, 0.05, 0.0):
-            again, anew = (model.segment_polygons(of, POLYGONS, share, marked=marked) for of in (works, described))
-            np.testing.assert_array_equal(again, anew)
+            cached, new = (model.segment_polygons(of, POLYGONS, share, marked=marked) for of in (workpieces, described))
+            np.testing.assert_array_equal(cached, new)
 
 
-def test_two_models_do_not_take_each_others_results(model, described):
-    works = [Workpiece(pose) for pose in described]
+def test_models_do_not_share_cached_results(model, described):
+    workpieces = [Workpiece(pose) for pose in described]
     other = PoseSegmentation(6, **SETTINGS, covariance_type="full").fit(described)
     expected = [outcome(each, described) for each in (model, other)]
     for i in (0, 1, 0):
-        for again, anew in zip(outcome((model, other)[i], works), expected[i], strict=True):
-            np.testing.assert_array_equal(again, anew)
+        for cached, new in zip(outcome((model, other)[i], workpieces), expected[i], strict=True):
+            np.testing.assert_array_equal(cached, new)
 
 
-def test_a_model_learned_from_workpieces_is_the_same(model, described):
+def test_fit_to_workpieces_gives_the_same_model(model, described):
     again = PoseSegmentation(6, **SETTINGS).fit([Workpiece(pose) for pose in described])
     assert again.to_json() == model.to_json()
 
 
-def test_where_all_components_would_be_too_many_numbers_labels_are_nearly_the_same(model, described, monkeypatch):
+def test_labels_hardly_change_where_posteriors_are_too_many_to_keep(model, described, monkeypatch):
     usual = model.segment_polygons(described, POLYGONS)
     monkeypatch.setattr(labeler, "MOST_POSTERIORS", 0)
     assert (model.segment_polygons(described, POLYGONS) == usual).mean() > 0.999
 
 
-def test_another_number_of_segments_is_a_coarser_or_finer_cut(model, described):
+def test_other_numbers_of_segments_are_nested(model, described):
     before = model.to_json()
     finest = model.with_segments(10).predict(described[0])
     for number in (2, 4, 6):
         coarse = model.with_segments(number).predict_proba(described[0])
         assert coarse.shape[1] == number
-        # Groups of groups: what is one segment among many is in one among few, where it is the likeliest in both.
+        # Groups of groups: faces of one fine segment are in one coarse segment.
         counts = np.zeros((10, number))
         np.add.at(counts, (finest, coarse.argmax(axis=1)), 1)
         assert counts.max(axis=1).sum() > 0.9 * counts.sum()
     assert model.to_json() == before
 
 
-def test_the_number_that_was_learned_is_the_model_itself(model, described):
+def test_learned_number_of_segments_gives_the_same_model(model, described):
     again = model.with_segments(4).with_segments(6, described)
     assert again.to_json() == model.to_json()
     np.testing.assert_array_equal(again.predict(described[0]), model.predict(described[0]))
 
 
-def test_regions_are_those_of_the_new_number_where_poses_are_given(model, described):
+def test_regions_follow_the_number_of_segments_if_poses_are_given(model, described):
     few = model.with_segments(2, described)
     assert few.regions_.n_groups == 2
     assert model.regions_.n_groups > 2
@@ -106,7 +106,7 @@ def test_regions_are_those_of_the_new_number_where_poses_are_given(model, descri
     assert few.grouping_.number_of_wholes(2) == fitted.regions_.n_groups
 
 
-def test_sides_are_told_with_the_regions_that_were_learned(model, described):
+def test_sides_follow_from_the_learned_regions(model, described):
     few, faces = model.with_segments(4), np.arange(POSES[0].n_faces)
     for pose in described:
         labels = few.segment_polygons([pose], [faces])
@@ -115,14 +115,14 @@ def test_sides_are_told_with_the_regions_that_were_learned(model, described):
         assert {-1, 1} <= set(side)
 
 
-def test_an_open_number_and_saving(model, described):
+def test_open_number_of_segments_is_saved(model, described):
     auto = model.with_segments("auto")
     assert auto.n_segments_ == model.grouping_.best_number()
     read = PoseSegmentation.from_json(auto.to_json())
     np.testing.assert_array_equal(read.predict(described[1]), auto.predict(described[1]))
 
 
-def test_more_segments_than_components_and_the_papers_setting_are_refused(model, described):
+def test_impossible_numbers_of_segments_are_refused(model, described):
     with pytest.raises(ValueError, match=r"n_segments is 25, but the model has 24 components: fit a new model"):
         model.with_segments(25)
     with pytest.raises(ValueError, match="n_segments must be a whole number"):

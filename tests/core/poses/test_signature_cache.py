@@ -1,4 +1,4 @@
-"""Signatures that were computed before: the same for the same content and settings, and for nothing else."""
+"""Caches return a result for the same content and settings, and for nothing else."""
 
 import functools
 import multiprocessing
@@ -17,7 +17,7 @@ POSE = creature(0.3, 3)
 
 
 class Counting:
-    """A cache that tells what it was asked."""
+    """Cache that counts its hits and misses."""
 
     def __init__(self, cache):
         self.cache, self.hits, self.misses = cache, 0, 0
@@ -40,7 +40,7 @@ class Counting:
 
 @pytest.fixture(params=["memory", "disk"])
 def cache(request, tmp_path):
-    """A cache that holds the signature of one pose."""
+    """Cache that holds the signature of one pose."""
     kept = Counting(MemoryCache() if request.param == "memory" else DiskCache(tmp_path / "kept"))
     PoseSegmentation(**SMALL).describe_all([POSE], cache=kept)
     assert (kept.hits, kept.misses) == (0, 1)
@@ -56,7 +56,7 @@ def same(one, other):
     return True
 
 
-def test_a_signature_is_what_would_be_computed(cache):
+def test_cached_signature_equals_a_computed_one(cache):
     computed = PoseSegmentation(**SMALL).describe(POSE)
     (kept,) = PoseSegmentation(**SMALL).describe_all([TriangleMesh(POSE.vertices, POSE.faces)], cache=cache)
     assert cache.hits == 1
@@ -64,7 +64,7 @@ def test_a_signature_is_what_would_be_computed(cache):
     assert kept.laplacian == computed.laplacian
 
 
-def test_what_does_not_enter_the_signature_does_not_matter(cache):
+def test_parameters_of_the_mixture_do_not_change_the_key(cache):
     others = {"n_segments": 6, "smoothness": 2.0, "covariance_type": "diag", "scaling": "raw", "random_state": 3}
     PoseSegmentation(**{**SMALL, **others}).describe_all([POSE], cache=cache)
     assert cache.hits == 1
@@ -73,14 +73,14 @@ def test_what_does_not_enter_the_signature_does_not_matter(cache):
 @pytest.mark.parametrize(
     "change", [{"n_eigenpairs": 31}, {"n_energies": 21}, {"accuracy": "exact"}, {"laplacian": "delaunay"}]
 )
-def test_another_setting_is_another_signature(cache, change):
+def test_parameters_of_the_signature_change_the_key(cache, change):
     model = PoseSegmentation(**{**SMALL, **change})
     (found,) = model.describe_all([POSE], cache=cache)
     assert cache.hits == 0
     assert same(found, model.describe(POSE))
 
 
-def test_a_moved_vertex_another_face_or_another_order_is_another_mesh(cache):
+def test_changed_mesh_has_another_key(cache):
     moved = POSE.vertices.copy()
     moved[7, 1] += 1e-9
     turned = POSE.faces.copy()
@@ -95,8 +95,8 @@ def test_a_moved_vertex_another_face_or_another_order_is_another_mesh(cache):
     assert cache.hits == 0
 
 
-def test_what_is_connected_otherwise_is_another_surface(cache):
-    """A cut that is closed in this pose, but open in another one."""
+def test_other_connection_has_another_key(cache):
+    """A cut in the mesh is closed in this pose, but open in another one."""
     cut = POSE.faces.copy()
     corner = cut[0, 0]
     cut[0, 0] = POSE.n_vertices
@@ -110,14 +110,14 @@ def test_what_is_connected_otherwise_is_another_surface(cache):
     assert cache.hits == 0
 
 
-def test_how_loose_parts_are_tied_matters(cache):
+def test_other_ties_of_islands_have_another_key(cache):
     pair = together(POSE, TriangleMesh(0.2 * POSE.vertices + 3, POSE.faces))
     for pieces in ("joined", "separate"):
         PoseSegmentation(**SMALL, pieces=pieces).describe_all([pair], cache=cache)
     assert (cache.hits, cache.misses) == (0, 3)
 
 
-def test_poses_that_were_done_are_kept_when_a_job_is_canceled():
+def test_finished_poses_of_a_canceled_job_are_kept():
     cache, poses = Counting(MemoryCache()), [creature(bend, 3) for bend in (0.0, 0.2, 0.4)]
 
     def cancel(stage, share):
@@ -134,7 +134,7 @@ def described(*bends):
     return [PoseSegmentation(**SMALL).describe(creature(bend, 3)) for bend in bends]
 
 
-def test_memory_is_limited_and_the_least_recently_used_leaves_first():
+def test_memory_cache_is_limited_and_drops_the_least_recently_used():
     one, two, three = described(0.0, 0.2, 0.4)
     size = sum(array.nbytes for array in one.arrays().values())
     cache = MemoryCache(int(2.5 * size))
@@ -149,21 +149,21 @@ def test_memory_is_limited_and_the_least_recently_used_leaves_first():
     assert cache.size == 0
 
 
-def test_what_is_larger_than_the_limit_is_not_kept():
+def test_entry_above_the_limit_is_not_kept():
     (one,) = described(0.0)
     cache = MemoryCache(1000)
     cache.put("one", one)
     assert cache.get("one") is None
 
 
-def test_what_is_kept_cannot_be_changed_by_one_who_asks():
+def test_kept_arrays_are_read_only():
     cache, (one,) = MemoryCache(), described(0.0)
     cache.put("one", one)
     with pytest.raises(ValueError, match="read-only"):
         cache.get("one").signature[0] = 0
 
 
-def test_a_folder_is_limited_and_the_least_recently_used_leaves_first(tmp_path):
+def test_disk_cache_is_limited_and_removes_the_least_recently_used(tmp_path):
     poses = described(0.0, 0.2, 0.4)
     cache = DiskCache(tmp_path, 10**9)
     for i, pose in enumerate(poses[:2]):
@@ -175,7 +175,7 @@ def test_a_folder_is_limited_and_the_least_recently_used_leaves_first(tmp_path):
     assert [cache.get(str(i)) is None for i in range(3)] == [False, True, False]
 
 
-def test_a_damaged_file_counts_as_none_and_is_replaced(tmp_path):
+def test_damaged_file_counts_as_missing_and_is_replaced(tmp_path):
     cache, (one, two) = DiskCache(tmp_path), described(0.0, 0.2)
     for damage in (b"", b"PK\x03\x04 no zip", None):
         cache.put("one", two)
@@ -186,13 +186,13 @@ def test_a_damaged_file_counts_as_none_and_is_replaced(tmp_path):
         assert same(cache.get("one"), one)
 
 
-def test_a_file_with_objects_is_not_read(tmp_path):
+def test_file_with_python_objects_is_not_read(tmp_path):
     cache = DiskCache(tmp_path)
     np.savez(tmp_path / "one.npz", vertices=np.array([{}], dtype=object))
     assert cache.get("one") is None
 
 
-def test_a_folder_that_cannot_be_written_to_is_told_of_and_costs_nothing(tmp_path):
+def test_cache_that_cannot_be_written_gives_a_warning_and_the_result(tmp_path):
     class Full:
         def get(self, key):
             return None
@@ -204,7 +204,7 @@ def test_a_folder_that_cannot_be_written_to_is_told_of_and_costs_nothing(tmp_pat
         assert PoseSegmentation(**SMALL).describe(POSE, cache=Full()).signature.shape[1] == 20
 
 
-def test_unfinished_files_are_none_and_go_when_they_are_old(tmp_path):
+def test_old_unfinished_files_are_removed(tmp_path):
     cache, (one,) = DiskCache(tmp_path), described(0.0)
     old, new = tmp_path / "old.part", tmp_path / "new.part"
     for path in (old, new):
@@ -243,7 +243,7 @@ def test_several_processes_use_one_folder(tmp_path):
 
 POSES = [creature(bend, 3) for bend in (0.0, 0.3)]
 OTHER = creature(0.2, 2)
-"""Of another meshing."""
+"""Pose with another mesh."""
 LEARNED = {"one mesh": POSES, "one pose": POSES[:1], "meshes": [POSES[0], OTHER]}
 
 
@@ -263,14 +263,14 @@ def model_without_a_cache(learned, number, **settings):
     ],
     ids=["one mesh", "one mesh, raw", "one pose", "meshes", "meshes, tied"],
 )
-def test_a_fit_with_a_cache_is_the_very_same_as_one_without(cache, learned, settings):
+def test_fit_with_a_cache_equals_fit_without(cache, learned, settings):
     for number in (6, 4):
         parameters = SMALL | settings | {"n_segments": number}
         cached = PoseSegmentation(**parameters).fit(LEARNED[learned], cache=cache)
         assert cached.to_json() == model_without_a_cache(learned, number, **settings)
 
 
-def test_another_number_of_segments_needs_no_mixtures(cache):
+def test_fit_with_another_number_of_segments_reuses_the_candidates(cache):
     stages = {}
     for number in (4, 8, 3, "auto"):
         said = stages[number] = set()
@@ -280,7 +280,7 @@ def test_another_number_of_segments_needs_no_mixtures(cache):
     assert all(len(of_number) < len(stages[4]) / 2 for number, of_number in stages.items() if number != 4)
 
 
-def test_what_enters_the_mixtures_makes_others(cache):
+def test_parameters_of_the_candidates_change_the_key(cache):
     PoseSegmentation(**SMALL).fit(POSES, cache=cache)
     changes = (
         {"n_segments": 9}, {"covariance_type": "diag"}, {"scaling": "raw"}, {"n_energies": 21},
@@ -291,8 +291,8 @@ def test_what_enters_the_mixtures_makes_others(cache):
         assert cache.kept == kept, change
 
 
-def test_mixtures_with_fewer_components_than_meant_are_not_kept(cache):
-    """How many they have depends on the number of segments then."""
+def test_candidates_with_fewer_components_than_planned_are_not_kept(cache):
+    """The number of their components depends on the number of segments."""
     cube = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
     box = TriangleMesh(cube, [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6],
                               [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]])  # fmt: skip
@@ -302,7 +302,7 @@ def test_mixtures_with_fewer_components_than_meant_are_not_kept(cache):
         assert cached.to_json() == PoseSegmentation(**parameters).fit([box]).to_json()
 
 
-def test_mixtures_that_are_damaged_are_made_again(tmp_path):
+def test_damaged_candidates_are_computed_again(tmp_path):
     cache = DiskCache(tmp_path)
     model = PoseSegmentation(**SMALL).fit(POSES, cache=cache)
     for path in tmp_path.glob("*.npz"):
