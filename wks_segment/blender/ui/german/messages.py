@@ -1,7 +1,6 @@
 """What the extension says while it works, in German.
 
-`…` stands for what is filled in; in the German text {1} is the first of these as it is, and {1!} the same as a message
-of its own.
+The fields of a template are those of the English one, in any order, and are written as they are there.
 """
 
 GERMAN_MESSAGES = {
@@ -12,11 +11,11 @@ GERMAN_MESSAGES = {
     "Accepted": "Angenommen",
     "1 pose": "1 Pose",
     "{count} poses": "{count} Posen",
-    "{count:,} vertices": "{count} Vertices",
+    "{count:,} vertices": "{count:,} Vertices",
     "{count} segments": "{count} Segmente",
     "{segments} segments in {parts} parts": "{segments} Segmente in {parts} Teilen",
     "better triangles for {count}": "bessere Dreiecke für {count}",
-    "{seconds:.1f} seconds": "{seconds} Sekunden",
+    "{seconds:.1f} seconds": "{seconds:.1f} Sekunden",
     "Cleared the segments of {count} meshes": "Segmente von {count} Meshes entfernt",
     "Unwrapped {count} meshes by segments": "{count} Meshes nach Segmenten abgewickelt",
     "Transferred to {count} objects": "Auf {count} Objekte übertragen",
@@ -81,7 +80,7 @@ GERMAN_MESSAGES = {
     'the scene "{name}" was deleted': 'die Szene "{name}" wurde gelöscht',
     "Large Job": "Große Arbeit",
     "Go On": "Fortfahren",
-    "{count} poses of up to {vertices:,} vertices take about {minutes:,.1f} minutes and {memory:,.1f} GB of memory; allowed are {allowed_minutes:,.1f} minutes and {allowed_memory:,.1f} GB: raise the limit, take fewer poses, or learn from a decimated copy and apply the model to this mesh": "{count} Posen mit bis zu {vertices} Vertices brauchen etwa {minutes} Minuten und {memory} GB Speicher; erlaubt sind {allowed_minutes} Minuten und {allowed_memory} GB: die Grenze erhöhen, weniger Posen nehmen, oder aus einer dezimierten Kopie lernen und das Modell auf dieses Mesh anwenden",
+    "{count} poses of up to {vertices:,} vertices take about {minutes:,.1f} minutes and {memory:,.1f} GB of memory; allowed are {allowed_minutes:,.1f} minutes and {allowed_memory:,.1f} GB: raise the limit, take fewer poses, or learn from a decimated copy and apply the model to this mesh": "{count} Posen mit bis zu {vertices:,} Vertices brauchen etwa {minutes:,.1f} Minuten und {memory:,.1f} GB Speicher; erlaubt sind {allowed_minutes:,.1f} Minuten und {allowed_memory:,.1f} GB: die Grenze erhöhen, weniger Posen nehmen, oder aus einer dezimierten Kopie lernen und das Modell auf dieses Mesh anwenden",
     "Reading": "Wird gelesen",
     "pose {number}": "Pose {number}",
     "pose {number} of {count}": "Pose {number} von {count}",
@@ -89,7 +88,7 @@ GERMAN_MESSAGES = {
     "parts": "Teile",
     "regions": "Bereiche",
     # Live, and the models that fit.
-    "Labels take {seconds:.0f} seconds here, too long to follow by themselves": "Segmente brauchen hier {seconds} Sekunden, zu lange, um von selbst zu folgen",
+    "Labels take {seconds:.0f} seconds here, too long to follow by themselves": "Segmente brauchen hier {seconds:.0f} Sekunden, zu lange, um von selbst zu folgen",
     "Nothing was learned or applied since this file was opened, or it was undone": "Seit diese Datei geöffnet wurde, wurde nichts gelernt oder angewendet, oder es wurde rückgängig gemacht",
     "Segments do not follow any more, learn or apply again: {reason}": "Segmente folgen nicht mehr, neu lernen oder anwenden: {reason}",
     "This number of segments takes a new Learn and Segment: {reason}": "Diese Anzahl von Segmenten geht nur, wenn neu gelernt wird (Lernen und segmentieren): {reason}",
@@ -241,7 +240,7 @@ GERMAN_MESSAGES = {
     "The model in this file cannot be used: {reason}": "Das Modell in dieser Datei kann nicht verwendet werden: {reason}",
     "{path}: there is no such file": "{path}: diese Datei gibt es nicht",
     "{path} is write-protected": "{path} ist schreibgeschützt",
-    "{size:.0f} MB is too large for a model": "{size} MB sind zu groß für ein Modell",
+    "{size:.0f} MB is too large for a model": "{size:.0f} MB sind zu groß für ein Modell",
     "the model takes {size:.0f} MB, but at most {most:.0f} MB can be read again: take fewer segments or energies, or a covariance other than full": "das Modell braucht {size:.0f} MB, aber höchstens {most:.0f} MB können wieder gelesen werden: weniger Segmente oder Energien nehmen, oder eine andere Kovarianz als Voll",
     "this is not a model of WKS Segment": "das ist kein Modell von WKS Segment",
     "this is not a model of WKS Segment, but a binary file": "das ist kein Modell von WKS Segment, sondern eine Binärdatei",
@@ -249,9 +248,9 @@ GERMAN_MESSAGES = {
     "the model has version {version!r}, this program reads {known}: learn it again": "das Modell hat Version {version!r}, dieses Programm liest {known}: es neu lernen",
     "the model has version {version!r}, this program reads {known}: update WKS Segment": "das Modell hat Version {version!r}, dieses Programm liest {known}: WKS Segment aktualisieren",
     "the model has a bad parameter: {reason}": "das Modell hat einen falschen Parameter: {reason}",
-    "{name} must be a whole number of at least {least}, not {value!r}": "{name} muss eine ganze Zahl von mindestens {least} sein, nicht {value}",
+    "{name} must be a whole number of at least {least}, not {value!r}": "{name} muss eine ganze Zahl von mindestens {least} sein, nicht {value!r}",
     "{name} must be one of {choices}, not {value!r}": "{name} muss eines von {choices} sein, nicht {value!r}",
-    "smoothness must be a number from 0 to {most}, not {value!r}": "smoothness muss eine Zahl von 0 bis {most} sein, nicht {value}",
+    "smoothness must be a number from 0 to {most}, not {value!r}": "smoothness muss eine Zahl von 0 bis {most} sein, nicht {value!r}",
     'n_segments must be a number with preset="paper": "auto" needs the default preset': 'n_segments muss mit preset="paper" eine Zahl sein: "auto" braucht die übliche Voreinstellung',
     "the model is damaged: {reason}": "das Modell ist beschädigt: {reason}",
     "its parameters are not {names}": "seine Parameter sind nicht {names}",
@@ -291,4 +290,4 @@ GERMAN_MESSAGES = {
     "{path}: cannot write the image": "{path}: das Bild kann nicht geschrieben werden",
     "{path}: cannot write the image: {reason}": "{path}: das Bild kann nicht geschrieben werden: {reason}",
 }
-"""By English message."""
+"""By English template."""
