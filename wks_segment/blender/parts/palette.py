@@ -1,4 +1,4 @@
-"""Colors for parts: clearly different, never black, and the same for a part whatever the number of segments."""
+"""Palettes for parts: clearly different colors, never black, the same for a part whatever the number of segments."""
 
 from __future__ import annotations
 
@@ -12,21 +12,25 @@ from ...core.mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from .part_ids import segments_of, sides_of
 
 MAX_COLORS = 64
+"""Colors of a palette; segments beyond that repeat them."""
 STEPS = 24
-"""Candidates along each of red, green and blue."""
+"""Values of red, green and blue that candidates for colors are combined from."""
 LIGHTNESS = (0.50, 0.86)
 """Range of lightness in OKLab, 0 black to 1 white: shading must stay readable on every color."""
 CHROMA = (0.085, 0.18)
 """Range of the distance from gray in OKLab: gray is what an object without segments looks like, neon tires the eye."""
 FIRST_COLOR = (0.86, 0.34, 0.28)
-"""The color to start from, a warm red."""
+"""The first color, from which the others are chosen: a warm red."""
 LEFT_LIGHTNESS, RIGHT_LIGHTNESS = (0.70, 0.92), (0.44, 0.60)
-"""The same range of lightness for parts on the left and on the right, which are told apart by it …"""
+"""Ranges of lightness for parts on the left and on the right: sides differ by lightness."""
 SIDED_CHROMA = (0.06, 0.30)
+"""Range of the distance from gray for parts on the left and on the right, wider so that they can differ."""
 SIDED_HUE = radians(35)
-"""… and recognized by a hue that differs from that of their segment by this angle at most."""
+"""Largest angle between the hues of a segment's left or right part and its color in the middle, so that both sides are
+recognized as the same segment."""
 USUAL, RARE = 12, 1.7
-"""Colors of the palette behind so many are needed by few characters: they may be nearer by this factor."""
+"""Few characters have more segments than `USUAL`: colors of parts with sides may be nearer to the palette's colors
+beyond that, by the factor `RARE`."""
 
 # Björn Ottosson, "A perceptual color space for image processing" (2020): linear sRGB to cone responses to OKLab.
 _TO_CONES = np.array(
@@ -52,12 +56,12 @@ BLINDNESS = np.array(
         [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
     ]
 )
-_BY_ALL = np.concatenate([np.eye(3)[None], BLINDNESS])
+_COLOR_VISIONS = np.concatenate([np.eye(3)[None], BLINDNESS])
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """What the colors of a palette are chosen from, and by whom they are to be told apart."""
+    """Colors that a palette may have, and whether color-blind people must be able to tell them apart."""
 
     title: str
     description: str
@@ -69,8 +73,10 @@ class Recipe:
     color_blind: bool = False
 
     def seen(self, srgb: FloatArray) -> FloatArray:
-        """(k, …, 3) sRGB colors in OKLab, as each of those sees them who are to tell them apart."""
-        return np.stack([_lab_of_linear(linear(srgb) @ eye.T) for eye in _BY_ALL[: 4 if self.color_blind else 1]])
+        """(k, …, 3) sRGB colors in OKLab, as each of k kinds of color vision sees them."""
+        return np.stack(
+            [_lab_of_linear(linear(srgb) @ eye.T) for eye in _COLOR_VISIONS[: 4 if self.color_blind else 1]]
+        )
 
 
 DEFAULT_PALETTE = "calm"
@@ -91,7 +97,7 @@ RECIPES = {
 
 @cache
 def palette(name: str = DEFAULT_PALETTE) -> FloatArray:
-    """(MAX_COLORS, 3) sRGB colors, 0 to 1: each as far as possible, to the eye, from all before it."""
+    """(MAX_COLORS, 3) sRGB colors, 0 to 1: each looks as different as possible from all before it."""
     recipe = RECIPES[name]
     candidates, lab = _candidates()
     candidates = candidates[_within(lab, recipe.lightness, recipe.chroma)]
@@ -109,9 +115,9 @@ def palette(name: str = DEFAULT_PALETTE) -> FloatArray:
 
 @cache
 def sided_palette(name: str = DEFAULT_PALETTE) -> FloatArray:
-    """(3, MAX_COLORS, 3) sRGB colors of the parts in the middle, which are those of the palette, left and right.
+    """(3, MAX_COLORS, 3) sRGB colors of parts in the middle (the palette), on the left and on the right.
 
-    Each as far as possible, to the eye, from all of the palette and from all sides before it.
+    Each color looks as different as possible from the whole palette and from all colors of sides before it.
     """
     recipe, colors = RECIPES[name], palette(name)
     candidates, lab = _candidates()
@@ -132,12 +138,12 @@ def sided_palette(name: str = DEFAULT_PALETTE) -> FloatArray:
 
 
 def _distance(seen: FloatArray, color: FloatArray) -> FloatArray:
-    """(n,) distance of (k, n, 3) colors, as k see them, from one, for those to whom it is smallest."""
+    """(n,) smallest distance, over k kinds of color vision, of (k, n, 3) colors to a (k, 3) color."""
     return np.asarray(np.linalg.norm(seen - color[:, None], axis=2).min(axis=0))
 
 
 def _candidates() -> tuple[FloatArray, FloatArray]:
-    """(STEPS³, 3) sRGB colors to choose from, and the same in OKLab."""
+    """(STEPS³, 3) sRGB colors to choose from, and the same colors in OKLab."""
     axis = np.linspace(0, 1, STEPS)
     colors = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
     return colors, oklab(colors)
@@ -156,23 +162,23 @@ def _hue(lab: FloatArray) -> FloatArray:
 
 
 def colors_of(parts: IntArray, name: str = DEFAULT_PALETTE) -> FloatArray:
-    """(…, 3) sRGB color of each part in a palette; they repeat after MAX_COLORS segments."""
+    """(…, 3) sRGB color of each part in a palette; colors repeat after MAX_COLORS segments."""
     return sided_palette(name)[sides_of(parts), segments_of(parts) % MAX_COLORS]
 
 
 def most_different(used: FloatArray) -> FloatArray:
-    """(3,) the sRGB color of the palette that is, to the eye, as far as can be from the (k, 3) used ones."""
+    """(3,) sRGB color of the default palette that looks most different from the (k, 3) used colors."""
     apart = np.linalg.norm(oklab(palette())[:, None] - oklab(used), axis=2)
     return np.asarray(palette()[int(apart.min(axis=1).argmax())])
 
 
 def linear(srgb: FloatArray) -> FloatArray:
-    """(…, 3) sRGB colors in linear light, as materials take them."""
+    """(…, 3) linear RGB of sRGB colors, as materials need it."""
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
 
 
 def oklab(srgb: FloatArray) -> FloatArray:
-    """(…, 3) sRGB colors in OKLab, where a distance is what the eye sees."""
+    """(…, 3) sRGB colors in OKLab, where distances are as large as the differences that people see."""
     return _lab_of_linear(linear(srgb))
 
 

@@ -1,4 +1,4 @@
-"""What parts are called and how they are colored: as the user has it, else by their number."""
+"""Names and colors of parts: the user's, or else those that belong to their number."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ class Style:
 
     Attributes
     ----------
-    names
-        By the part's number; others are called as `parts.name_of` calls them.
-    colors
-        (3,) sRGB, 0 to 1, by the part's number; others have that of the palette.
-    palette
+    names : dict
+        The user's names by the part's number; other parts have the name of `part_ids.default_name`.
+    colors : dict
+        The user's colors, (3,) sRGB from 0 to 1, by the part's number; other parts have a color of the palette.
+    palette : str
         Name of the palette, one of `palette.RECIPES`.
     """
 
@@ -32,12 +32,12 @@ class Style:
     palette: str = DEFAULT_PALETTE
 
     @classmethod
-    def of(cls, notes: PartNotes, of_others: str = DEFAULT_PALETTE) -> Style:
-        """As a user has noted it, and the palette for other parts."""
-        return cls(notes.names, {part: np.array(color) for part, color in notes.colors.items()}, of_others)
+    def of(cls, notes: PartNotes, palette: str = DEFAULT_PALETTE) -> Style:
+        """The style from a user's notes, with the palette for other parts."""
+        return cls(notes.names, {part: np.array(color) for part, color in notes.colors.items()}, palette)
 
     def name_of(self, part: int) -> str:
-        """As a person reads it."""
+        """Name of a part."""
         return self.names.get(part) or part_ids.default_name(part)
 
     def colors_of(self, numbers: IntArray) -> FloatArray:
@@ -49,4 +49,4 @@ class Style:
 
 
 PLAIN = Style()
-"""Nothing renamed, nothing recolored."""
+"""The style without any name or color of the user."""

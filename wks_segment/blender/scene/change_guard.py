@@ -1,4 +1,4 @@
-"""Whether what was read is still as it was, so that nothing is written to what is another mesh by now."""
+"""Detects changes of meshes and of the scene after they were read, so that nothing is written to a changed mesh."""
 
 from __future__ import annotations
 
@@ -14,21 +14,23 @@ from .topology import polygon_sizes
 
 
 class Watch:
-    """Remembers the meshes of characters as they are when it is made, and a scene; holds on to nothing of Blender's."""
+    """Remembers a scene and the meshes of characters as they are now, without references to Blender's data."""
 
     def __init__(self, scene: bpy.types.Scene, characters: Iterable[Character]) -> None:
         self._scene = scene.name, scene.session_uid
-        found = {member: member.found() for character in characters for member in character.members}
-        self._states = {member: (_state(obj), _content(obj.data)) for member, obj in found.items() if obj is not None}
+        objects = {member: member.found() for character in characters for member in character.members}
+        self._states = {
+            member: (_mesh_state(obj), _content(obj.data)) for member, obj in objects.items() if obj is not None
+        }
 
     def glance(self) -> None:
-        """Raise ChangedError, which says what happened, if a change is seen at a glance: for many times a second."""
+        """Raise ChangedError if a change can be seen without reading meshes: fast enough for many times a second."""
         self.scene()
         for member, (state, _) in self._states.items():
-            _check(member, member.found(), state)
+            _check_member(member, member.found(), state)
 
     def look(self) -> None:
-        """The same for any change of coordinates or faces: for once, before something is written."""
+        """Raise ChangedError also if coordinates or faces changed: slower, for once before something is written."""
         self.glance()
         for member, (_, content) in self._states.items():
             obj = member.found()
@@ -36,7 +38,7 @@ class Watch:
                 raise ChangedError('the mesh of "{name}" was edited', name=member.name)
 
     def scene(self) -> bpy.types.Scene:
-        """The scene; ChangedError if it is gone."""
+        """The scene; ChangedError if it was deleted."""
         name, uid = self._scene
         scene = bpy.data.scenes.get(name)
         if scene is None or scene.session_uid != uid:
@@ -46,17 +48,17 @@ class Watch:
         return scene
 
 
-def _state(obj: bpy.types.Object) -> tuple[str, int, int]:
-    """Mode and numbers of vertices and polygons: what is cheap to ask."""
+def _mesh_state(obj: bpy.types.Object) -> tuple[str, int, int]:
+    """Mode and numbers of vertices and polygons of an object, which are cheap to read."""
     return obj.mode, len(obj.data.vertices), len(obj.data.polygons)
 
 
-def _check(member: Member, obj: bpy.types.Object | None, state: tuple[str, int, int]) -> None:
+def _check_member(member: Member, obj: bpy.types.Object | None, state: tuple[str, int, int]) -> None:
     if obj is None:
         raise ChangedError('"{name}" was deleted', name=member.name)
     if obj.data.session_uid != member.mesh_uid:
         raise ChangedError('"{name}" has another mesh now', name=member.name)
-    mode, *size = _state(obj)
+    mode, *size = _mesh_state(obj)
     if mode != state[0]:
         raise ChangedError('"{name}" went into {mode} Mode', name=member.name, mode=mode.replace("_", " ").title())
     if tuple(size) != state[1:]:
@@ -64,7 +66,7 @@ def _check(member: Member, obj: bpy.types.Object | None, state: tuple[str, int, 
 
 
 def _content(mesh: bpy.types.Mesh) -> bytes:
-    """A number, as good as unique, for the coordinates and faces of a mesh."""
+    """Hash of the coordinates and faces of a mesh."""
     digest = blake2b(digest_size=16)
     for values in (read_floats(mesh.vertices, "co", 3), read_ints(mesh.loops, "vertex_index"), polygon_sizes(mesh)):
         digest.update(values.tobytes())

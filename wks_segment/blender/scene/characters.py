@@ -1,4 +1,4 @@
-"""Which objects make up one character."""
+"""Characters: the mesh objects that together are one body."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ CONVERTIBLE = {
     "CURVE": "curve", "SURFACE": "surface", "FONT": "text", "META": "metaball", "CURVES": "hair object",
     "POINTCLOUD": "point cloud", "VOLUME": "volume", "GREASEPENCIL": "Grease Pencil object",
 }  # fmt: skip
-"""Types of object that a mesh can be made of, and what artists call them."""
+"""Types of objects that Blender can convert to a mesh, and their names in Blender."""
 
 
 @dataclass(frozen=True)
 class Member:
-    """How an object is found again, and its mesh told from another: by numbers that last as long as Blender runs."""
+    """Reference to an object and its mesh by numbers that stay the same as long as Blender runs."""
 
     name: str
     uid: int
     mesh_uid: int
 
     def found(self) -> bpy.types.Object | None:
-        """The object, under whatever name; None if it is gone, or is no mesh any more."""
+        """The object, also if it was renamed; None if it was deleted or has no mesh any more."""
         obj = bpy.data.objects.get(self.name)
         if obj is None or obj.session_uid != self.uid:
             obj = next((other for other in bpy.data.objects if other.session_uid == self.uid), None)
@@ -35,16 +35,16 @@ class Member:
 
 @dataclass(frozen=True, init=False)
 class Character:
-    """One or several mesh objects that are one body, in the order of their names.
+    """One or several mesh objects that are one body, ordered by name.
 
-    Holds on to nothing of Blender's, and so can be handed to a thread: what is there is looked up each time.
+    Keeps no references to Blender's data, so that threads can have it: objects are looked up each time.
 
     Attributes
     ----------
     name : str
-        Of the object, or of the armature that holds several together.
-    members
-        What the objects are found by.
+        Name of the object, or of the armature if there are several objects.
+    members : tuple of Member
+        References to the objects.
     """
 
     name: str
@@ -58,12 +58,12 @@ class Character:
 
     @property
     def objects(self) -> tuple[bpy.types.Object, ...]:
-        """The objects; not for a thread.
+        """The objects; must not be called from a thread.
 
         Raises
         ------
         UserError
-            If one is gone.
+            If one was deleted.
         """
         found = {member.name: member.found() for member in self.members}
         missing = [name for name, obj in found.items() if obj is None]
@@ -73,7 +73,7 @@ class Character:
 
     @property
     def meshes(self) -> tuple[int, ...]:
-        """What tells its meshes from those of another character; fit for a thread."""
+        """Numbers of the meshes, the same for characters that share their meshes; may be called from a thread."""
         return tuple(member.mesh_uid for member in self.members)
 
     def frame_ranges(self) -> list[tuple[float, float]]:
@@ -91,7 +91,7 @@ class Character:
         return ranges
 
     def animated(self) -> list[bpy.types.ID]:
-        """Data-blocks whose animation moves the character: objects, armatures, shape keys."""
+        """Data-blocks with the character's animation: objects, armatures, shape keys."""
         blocks: dict[bpy.types.ID, None] = {}
         for obj in self.objects:
             blocks |= dict.fromkeys(b for b in (armature_of(obj), obj, obj.data.shape_keys) if b is not None)
@@ -99,7 +99,7 @@ class Character:
 
 
 def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
-    """The armature that deforms an object or that it hangs from, if any."""
+    """The armature that deforms an object or that the object is parented to, if there is one."""
     for modifier in obj.modifiers:
         if modifier.type == "ARMATURE" and modifier.object is not None:
             return modifier.object
@@ -112,21 +112,21 @@ def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
 
 
 def mesh_objects(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
-    """Those of the objects that hold a mesh and are not there only to draw a bone, by name."""
+    """The objects with a mesh, ordered by name, except those that only show the shape of a bone."""
     meshes = sorted((obj for obj in objects if obj.type == "MESH"), key=lambda obj: obj.name)
     return [obj for obj in meshes if not _draws_a_bone(obj)]
 
 
 def selected_meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The selected mesh objects, by name, and the visible ones on a selected armature if none of these is selected.
+    """The selected mesh objects, ordered by name; for a selected armature without selected meshes, its visible ones.
 
-    Who clicks on a character often gets its bones.
+    A click on a character often selects its armature.
     """
     return mesh_objects(with_rigged(context.selected_objects, context.visible_objects))
 
 
 def with_rigged(selected: Iterable[bpy.types.Object], visible: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
-    """The selected mesh objects, and those of the visible ones that a selected armature stands for."""
+    """The selected mesh objects, and the visible ones of each selected armature that has none among the selected."""
     selected = list(selected)
     chosen = [obj for obj in selected if obj.type == "MESH"]
     rigs = {obj for obj in selected if obj.type == "ARMATURE"}
@@ -142,7 +142,7 @@ def quoted(names: Iterable[str]) -> str:
 
 
 def why_no_mesh(objects: Iterable[bpy.types.Object]) -> str:
-    """What to do to get a mesh, if none of the objects is one."""
+    """Message that says how to get a mesh, if none of the objects has one."""
     for obj in objects:
         if obj.type in CONVERTIBLE:
             template = '"{name}" is a {type}: convert it first (Object > Convert > Mesh)'
@@ -155,7 +155,7 @@ def why_no_mesh(objects: Iterable[bpy.types.Object]) -> str:
 
 
 def _draws_a_bone(obj: bpy.types.Object) -> bool:
-    """Whether an object only shows the bones of a rig, as importers add them: alone, and the shape of a bone."""
+    """Whether an object only shows the shape of a bone, as importers add such objects."""
     if obj.parent is not None or obj.modifiers:
         return False
     rigs = [other for other in bpy.data.objects if other.type == "ARMATURE" and other.pose is not None]
@@ -163,19 +163,19 @@ def _draws_a_bone(obj: bpy.types.Object) -> bool:
 
 
 def group(objects: Sequence[bpy.types.Object], together: bool = False) -> list[Character]:
-    """Characters that mesh objects make up: those on one armature or parented to each other are one.
+    """Group mesh objects into characters: objects with the same armature or parented to each other are one.
 
     Parameters
     ----------
     objects
         Mesh objects.
-    together
-        Take all of them as one character.
+    together : bool
+        Make one character of all objects.
 
     Raises
     ------
     UserError
-        If there is no object, or one belongs to a linked library and cannot be written to.
+        If there is no object, or one is linked from another file or is in Edit Mode.
     """
     if not objects:
         raise UserError("No mesh object to work on: select the character's mesh")
@@ -195,7 +195,7 @@ def group(objects: Sequence[bpy.types.Object], together: bool = False) -> list[C
 
 
 def _body_of(obj: bpy.types.Object, among: set[bpy.types.Object]) -> bpy.types.Object:
-    """What an object belongs to: its armature, the topmost of its parents that is among the objects, or itself."""
+    """The armature of an object, else the topmost of its parents that is among the objects, else the object itself."""
     armature = armature_of(obj)
     if armature is not None:
         return armature

@@ -1,4 +1,4 @@
-"""Opens and saves files in the formats that Blender's own importers and exporters know."""
+"""Opens and saves files in the formats of Blender's own importers and exporters."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..errors import UserError
 
 
 def _import_fbx(path: str) -> None:
-    if "fbx_import" in dir(bpy.ops.wm):  # from 4.5 on; hasattr is true of any name
+    if "fbx_import" in dir(bpy.ops.wm):  # since 4.5; hasattr is true for any name
         bpy.ops.wm.fbx_import(filepath=path)
     else:
         bpy.ops.import_scene.fbx(filepath=path)
@@ -48,9 +48,9 @@ EXPORTERS: dict[str, Callable[[str], object]] = {
 
 
 def open_files(paths: list[Path]) -> list[list[bpy.types.Object]]:
-    """Read files into an empty scene; the objects that came from each.
+    """Read files into an empty scene; gives the objects from each file.
 
-    A single .blend file is opened as it is, so that what is saved later is all of it.
+    A single .blend file is opened with all that it contains, so that nothing is missing when it is saved later.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def open_files(paths: list[Path]) -> list[list[bpy.types.Object]]:
         if bpy.context.object is not None and bpy.context.object.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
         return [list(bpy.context.scene.objects)]
-    # Not read_factory_settings: that would disable the extension which this runs in.
+    # Not read_factory_settings: that would disable this extension.
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     return [_import(path) for path in paths]
 
@@ -87,14 +87,14 @@ def _try(reader: Callable[[str], object], path: Path) -> None:
 
 
 def check_output(path: Path) -> None:
-    """UserError unless a scene can be written there, before the work begins."""
+    """UserError unless a scene can be written to a path; called before a long computation."""
     if path.suffix.lower() not in EXPORTERS:
         raise UserError("{path}: unknown format to write; known are {formats}", path=path, formats=", ".join(EXPORTERS))
     check_folder(path)
 
 
 def check_folder(path: Path) -> None:
-    """UserError unless the folder of a file is there."""
+    """UserError unless the folder of a file exists."""
     if not path.resolve().parent.is_dir():
         raise UserError("{path}: the folder {folder} does not exist", path=path, folder=path.resolve().parent)
     if path.is_dir():

@@ -1,4 +1,4 @@
-"""Reads the poses of a pose library: pose assets, or else actions, that move the bones of a character."""
+"""Reads the poses of a pose library: pose assets, or else actions, that move the bones of a character's armature."""
 
 from __future__ import annotations
 
@@ -15,18 +15,19 @@ from .characters import Character, armature_of
 from .poses import Pose, evenly, read_pose, with_rest
 
 BONE = re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]')
-"""The bone in the data path of an F-curve."""
+"""Matches the data path of an F-curve that moves a bone; the group is the name of the bone."""
 
 
 def read_actions(context: bpy.types.Context, character: Character, count: int) -> list[Pose]:
-    """A character in the poses of its library, at most `count` of them, evenly chosen; each from rest.
+    """A character in at most `count` poses of its library, evenly chosen; each pose starts from the rest position.
 
-    A pose asset is one pose, another action gives the one in its middle. The armature comes back as it was.
+    A pose asset is one pose; of another action, the pose at the middle frame is read. Afterwards the armature has its
+    pose from before.
 
     Raises
     ------
     UserError
-        If it has no armature, or no action in the file moves a bone of it.
+        If the character has no armature, or no action in the file moves a bone of it.
     """
     armature = next((found for found in map(armature_of, character.objects) if found is not None), None)
     if armature is None:
@@ -67,14 +68,14 @@ def _bones(action: bpy.types.Action) -> set[str]:
 
 @contextmanager
 def _posable(context: bpy.types.Context, armature: bpy.types.Object) -> Iterator[None]:
-    """While it lasts, no animation moves an armature; its pose comes back with all that is not keyed."""
+    """Turn the animation of an armature off for a while, and restore its pose with all that has no keyframes."""
     data = armature.animation_data
     if data is not None and data.use_tweak_mode:
         raise UserError(
             '"{name}" is in tweak mode: leave it first (Tab in the Nonlinear Animation editor)', name=armature.name
         )
     animation = {name: getattr(data, name, None) for name in ("action", "action_slot", "use_nla")} if data else {}
-    before = [(bone, _state(bone), dict(bone.items())) for bone in armature.pose.bones]
+    before = [(bone, _bone_state(bone), dict(bone.items())) for bone in armature.pose.bones]
     try:
         if data is not None:
             data.action, data.use_nla = None, False
@@ -83,7 +84,7 @@ def _posable(context: bpy.types.Context, armature: bpy.types.Object) -> Iterator
         for name, value in animation.items():
             if value is not None:
                 setattr(data, name, value)
-        # What is keyed is evaluated now, so that it does not overwrite what follows.
+        # Evaluate keyframes now, so that they do not overwrite what is restored next.
         context.view_layer.update()
         for bone, state, properties in before:
             for name, value in state.items():
@@ -93,8 +94,11 @@ def _posable(context: bpy.types.Context, armature: bpy.types.Object) -> Iterator
         context.view_layer.update()
 
 
-def _state(bone: bpy.types.PoseBone) -> dict[str, Any]:
-    """All of a bone that can be animated; how it turns comes first, since Blender converts the others to that."""
+def _bone_state(bone: bpy.types.PoseBone) -> dict[str, Any]:
+    """All properties of a bone that can be animated.
+
+    The rotation mode is the first one to be restored, since Blender converts the other properties when it is set.
+    """
     state: dict[str, Any] = {"rotation_mode": bone.rotation_mode}
     for prop in bone.bl_rna.properties:
         if prop.is_animatable and not prop.is_readonly and prop.type in ("FLOAT", "INT", "BOOLEAN"):

@@ -1,4 +1,4 @@
-"""Reads the poses to learn from, taken from where the settings say."""
+"""Reads the poses to learn from, from the source that the settings name."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .poses import Pose
 
 
 def read_training_poses(context: bpy.types.Context, settings: WKSSegmentSettings) -> list[Pose]:
-    """Poses to learn from, taken from where the settings say.
+    """Poses to learn from, read from the source that the settings name.
 
     Raises
     ------
     UserError
-        If there are none there, or they cannot be used.
+        If there are no poses, or they cannot be used.
     """
     characters = group(selected_meshes(context))
     if settings.source == "OBJECTS":
@@ -36,12 +36,12 @@ def read_training_poses(context: bpy.types.Context, settings: WKSSegmentSettings
 
 
 def active_character(context: bpy.types.Context, characters: Sequence[Character]) -> Character:
-    """The one among the selected characters that the active object is of, or the only one.
+    """The selected character that the active object belongs to, or the only one.
 
     Raises
     ------
     UserError
-        If there are several and the active object is of none.
+        If there are several, and the active object belongs to none of them.
     """
     active = context.active_object
     for character in characters:
@@ -56,7 +56,7 @@ def active_character(context: bpy.types.Context, characters: Sequence[Character]
 
 
 def chosen_frames(scene: bpy.types.Scene, character: Character, settings: WKSSegmentSettings) -> list[int]:
-    """Frames to take poses from: of the user's range, of the character's own animation, or of the scene's range.
+    """Frames to read poses at: from the user's range, the character's own animation, or the scene's range.
 
     Raises
     ------

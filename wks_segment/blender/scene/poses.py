@@ -1,4 +1,4 @@
-"""Reads poses: the surface of a character as the artist sees it, and the way back to the artist's own polygons."""
+"""Reads poses: the surface of a character as the artist sees it, with the artist's own polygon of each triangle."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ from .attributes import new_attribute, read_floats, read_ints
 from .characters import Character, armature_of, quoted
 
 ORIGIN = ".wks_segment_origin"
-"""Temporary face attribute: modifiers that make new faces copy it from the face that they make them of."""
+"""Temporary face attribute with the number of each face: modifiers copy it to the faces that they make of a face."""
 DEFORMING = frozenset({
     "ARMATURE", "CAST", "CLOTH", "CORRECTIVE_SMOOTH", "CURVE", "DISPLACE", "HOOK", "LAPLACIANDEFORM", "LATTICE",
     "MESH_CACHE", "MESH_DEFORM", "MESH_SEQUENCE_CACHE", "NORMAL_EDIT", "SHRINKWRAP", "SIMPLE_DEFORM", "SMOOTH",
     "LAPLACIANSMOOTH", "SOFT_BODY", "SURFACE_DEFORM", "WARP", "WAVE", "WEIGHTED_NORMAL",
 })  # fmt: skip
-"""Modifiers that only move vertices: behind them a face is the face that it was."""
+"""Modifiers that only move vertices, so that faces keep their numbers."""
 SAME_SURFACE = 1e-5
-"""Two poses that differ by less than this fraction of the size are one and the same."""
+"""Two poses are the same if no vertex moves by more than this fraction of the character's size; rounding of single
+precision is below it."""
 NO_FACES = "{names} has no faces: there is no surface to find segments on"
 NO_FACES_BUT_NODES = (
     "{names} has no faces: there is no surface to find segments on; if it consists of instances, add a Realize "
@@ -40,21 +41,21 @@ class Pose:
     Attributes
     ----------
     name : str
-        As an artist would call it: the object, the frame, the shape key.
+        Name for messages: with the object, and the frame or the shape key.
     character : Character
     mesh : TriangleMesh
         All objects of the character as they are seen, in world space.
     polygon_of : (m,) int array
         The polygon that each triangle comes from; the polygons of all objects are numbered one object after another.
-        -1: a modifier made it of nothing of the character's own.
+        −1 for triangles that a modifier made of something else than the character's polygons.
     vertex_of : (n,) int array
-        The character's own vertex that each vertex is, numbered in the same way; -1 where modifiers change faces, so
-        that only `polygon_of` tells what is where.
+        The character's own vertex of each vertex, numbered in the same way; −1 on objects whose modifiers change faces:
+        there, only `polygon_of` connects the pose with the character.
     axes : (3, 3) array
-        Columns: the character's own x, y and z in world space. x points to its left.
+        The character's own x, y and z axes in world space, as columns. x points to its left.
     rest : TriangleMesh, optional
-        The same triangles in the rest position of the character's armature, if it has one: where the artist put loose
-        parts together. The axes are then those that it has there.
+        The same triangles in the rest position of the character's armature, if it has one: there the artist has put
+        islands together. The axes are then those of the rest position.
     """
 
     name: str
@@ -67,7 +68,7 @@ class Pose:
 
     @property
     def upright(self) -> TriangleMesh:
-        """The rest position, or the pose where there is none, as the character itself sees it: x points to its left."""
+        """The rest position, or the pose if there is none, in the character's own axes: x points to its left."""
         mesh = self.mesh if self.rest is None else self.rest
         return TriangleMesh(mesh.vertices @ self.axes, mesh.faces)
 
@@ -81,13 +82,13 @@ class Pose:
         )
 
     def is_mesh_of(self, other: Pose) -> bool:
-        """Whether the other pose has the same triangles between as many vertices."""
+        """Whether the other pose has the same triangles and the same number of vertices."""
         return self.mesh.n_vertices == other.mesh.n_vertices and np.array_equal(self.mesh.faces, other.mesh.faces)
 
     def cut_as(self, other: Pose) -> Pose:
-        """The pose with the triangles of another one, if they are of the same polygons; else as it is.
+        """The pose with the triangles of another one, if these are of the same polygons; else the pose itself.
 
-        Blender cuts a polygon that is not flat in one way here and in another way there.
+        Blender triangulates a polygon that is not flat differently in different poses.
         """
         if self.is_mesh_of(other) or not self._has_polygons_of(other):
             return self
@@ -95,7 +96,7 @@ class Pose:
         return replace(self, mesh=TriangleMesh(self.mesh.vertices, other.mesh.faces), rest=rest)
 
     def _has_polygons_of(self, other: Pose) -> bool:
-        """Whether the other pose has the same polygons between as many vertices, however they are cut."""
+        """Whether the other pose has the same polygons and number of vertices, however polygons are triangulated."""
         count = self.mesh.n_vertices
         if count != other.mesh.n_vertices or not np.array_equal(self.polygon_of, other.polygon_of):
             return False
@@ -104,12 +105,12 @@ class Pose:
 
 
 def polygon_ranges(character: Character) -> list[tuple[bpy.types.Object, slice]]:
-    """Each object with its polygons' place in the character's numbering."""
+    """Each object of a character, and the range of its polygons in the character's numbering."""
     return _ranges(character, "polygons")
 
 
 def vertex_ranges(character: Character) -> list[tuple[bpy.types.Object, slice]]:
-    """Each object with its vertices' place in the character's numbering."""
+    """Each object of a character, and the range of its vertices in the character's numbering."""
     return _ranges(character, "vertices")
 
 
@@ -120,7 +121,7 @@ def _ranges(character: Character, of: str) -> list[tuple[bpy.types.Object, slice
 
 
 def read_objects(context: bpy.types.Context, characters: Sequence[Character]) -> list[Pose]:
-    """Each character as it is now, one pose each."""
+    """One pose of each character, as it is now."""
     return in_one_cut(
         [with_rest(context, [read_pose(context, character, character.name)])[0] for character in characters]
     )
@@ -129,7 +130,7 @@ def read_objects(context: bpy.types.Context, characters: Sequence[Character]) ->
 def read_frames(
     context: bpy.types.Context, character: Character, frames: Sequence[int], names: Sequence[str] | None = None
 ) -> list[Pose]:
-    """One character at frames of its animation, by these names; the scene comes back to its own frame."""
+    """A character at frames of its animation, with these names; the scene is at its own frame again afterwards."""
     scene = context.scene
     before, subframe = scene.frame_current, scene.frame_subframe
     try:
@@ -145,7 +146,7 @@ def read_frames(
 
 
 def read_markers(context: bpy.types.Context, character: Character, count: int) -> list[Pose]:
-    """One character at the frames of the timeline's markers, at most `count` of them, evenly chosen.
+    """A character at the frames of at most `count` markers of the timeline, evenly chosen.
 
     Raises
     ------
@@ -162,14 +163,14 @@ def read_markers(context: bpy.types.Context, character: Character, count: int) -
 
 
 def read_shape_keys(context: bpy.types.Context, character: Character, count: int) -> list[Pose]:
-    """A character in its shape keys, at most `count` of them, evenly chosen; each alone at its full value.
+    """A character in at most `count` of its shape keys, evenly chosen; each alone at its full value.
 
-    A key moves all objects of the character that have one of its name; the others show their basis.
+    A shape key moves all objects of the character that have one of this name; the others show their basis.
 
     Raises
     ------
     UserError
-        If there are no shape keys beside the basis, or all are muted.
+        If there are no shape keys except the basis, or all are muted.
     """
     keyed = [obj for obj in character.objects if obj.data.shape_keys is not None]
     names = list(
@@ -194,14 +195,14 @@ def read_shape_keys(context: bpy.types.Context, character: Character, count: int
 
 
 def evenly(first: int, last: int, count: int) -> list[int]:
-    """At most `count` different whole numbers from first to last, in equal steps from end to end."""
+    """At most `count` different integers from `first` to `last` in equal steps, with both ends."""
     return np.unique(np.linspace(first, last, max(count, 1)).round().astype(int)).tolist()
 
 
 def own_frames(scene: bpy.types.Scene, character: Character, count: int) -> list[int]:
-    """At most `count` frames spread over a character's own animation, or over the scene's range if it has none.
+    """At most `count` frames over a character's own animation, or over the scene's range if it has none.
 
-    From the middles of equal spans, since the first and the last frame of a cycle are the same pose.
+    They are the middles of equal spans, since the first and the last frame of a cycle are the same pose.
     """
     ranges = character.frame_ranges() or [(scene.frame_start, scene.frame_end)]
     first, last = min(first for first, _ in ranges), max(last for _, last in ranges)
@@ -210,16 +211,17 @@ def own_frames(scene: bpy.types.Scene, character: Character, count: int) -> list
 
 
 def in_one_cut(poses: Sequence[Pose]) -> list[Pose]:
-    """Poses, those that are of the same polygons with the same triangles."""
-    cut: list[Pose] = []
+    """The poses, with the same triangles in all poses of the same polygons."""
+    result: list[Pose] = []
     for pose in poses:
-        like = (pose.cut_as(other) for other in cut)
-        cut.append(next((found for found, other in zip(like, cut, strict=True) if found.is_mesh_of(other)), pose))
-    return cut
+        candidates = (pose.cut_as(other) for other in result)
+        same = (cut for cut, other in zip(candidates, result, strict=True) if cut.is_mesh_of(other))
+        result.append(next(same, pose))
+    return result
 
 
 def with_rest(context: bpy.types.Context, poses: list[Pose]) -> list[Pose]:
-    """Poses of one character together with its rest position, where its armature has one of the same polygons."""
+    """Poses of one character with its rest position, if it has an armature and the same polygons at rest."""
     poses = in_one_cut(poses)
     character = poses[0].character
     armatures = dict.fromkeys(obj.data for obj in map(armature_of, character.objects) if obj is not None)
@@ -243,7 +245,7 @@ def read_pose(context: bpy.types.Context, character: Character, name: str) -> Po
     Raises
     ------
     UserError
-        If an object has no faces, a modifier hides where its faces come from, or a coordinate is not finite.
+        If the character has no faces, a modifier hides where its faces come from, or a coordinate is not finite.
     """
     vertices: list[FloatArray] = []
     triangles: list[IntArray] = []
@@ -299,9 +301,10 @@ def _axes(character: Character, depsgraph: bpy.types.Depsgraph) -> FloatArray:
 def _read_object(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, origin_name: str | None
 ) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
-    """Vertices in world space, triangles, and what each is of the object's own mesh (-1: nothing, or not known).
+    """The surface of an object: vertices in world space, triangles, and where they come from.
 
-    Gives for each triangle the polygon that it comes from, and for each vertex the vertex.
+    The third array is the polygon of the object's own mesh that each triangle comes from, the fourth one the own vertex
+    of each vertex; −1 for none and for unknown.
     """
     evaluated = obj.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
@@ -325,14 +328,14 @@ def _read_object(
         world = np.array(evaluated.matrix_world, dtype=np.float64)
     finally:
         evaluated.to_mesh_clear()
-    with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is refused by name
+    with np.errstate(invalid="ignore", over="ignore"):  # read_pose refuses it
         vertices = vertices @ world[:3, :3].T + world[:3, 3]
     vertex_of = np.arange(len(vertices)) if same else np.full(len(vertices), -1)
     return vertices, triangles, polygon_of, vertex_of
 
 
 def _has_corners_of(mesh: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:
-    """Whether the corners of two meshes' faces are at the same vertices: those of one are then those of the other."""
+    """Whether two meshes have the same number of vertices, and their corners the same vertices."""
     return len(mesh.vertices) == len(other.vertices) and np.array_equal(
         read_ints(mesh.loops, "vertex_index"), read_ints(other.loops, "vertex_index")
     )
@@ -340,9 +343,9 @@ def _has_corners_of(mesh: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:
 
 @contextmanager
 def _marked_origins(character: Character) -> Iterator[dict[bpy.types.Mesh, str]]:
-    """While it lasts, meshes whose modifiers may make faces carry the number of each face, from 1, as an attribute.
+    """Add the number of each face as a temporary attribute to meshes whose modifiers may make faces.
 
-    From 1, since faces that a modifier takes from elsewhere get 0. Gives the name of the attribute for each mesh.
+    Numbers start at 1, since faces that a modifier takes from other meshes get 0. Gives the attribute's name by mesh.
     """
     meshes = {obj.data for obj in character.objects if any(m.type not in DEFORMING for m in obj.modifiers)}
     names: dict[bpy.types.Mesh, str] = {}
