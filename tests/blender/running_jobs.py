@@ -11,28 +11,32 @@ from wks_segment.blender.workflow.background_job import job_holder
 
 OPS = bpy.ops.wks_segment
 LEARN, APPLY = WKS_SEGMENT_OT_learn, WKS_SEGMENT_OT_apply
-GOING = {"PASS_THROUGH"}
+RUNNING = {"PASS_THROUGH"}
 """What an operator returns while its job runs."""
-LONG = 60
+TIMEOUT = 60
 """Seconds after which a test that hangs fails."""
 
 
-class Ran:
-    """What Blender makes of an operator's class: an operator that can be called, and keeps what it says."""
+class CallableOperator:
+    """Make an operator that can be called without Blender, and keeps what it reports."""
 
     def __new__(cls, operator, **properties):
-        said = []
+        reported = []
         own = {name: getattr(operator, name) for name in ("bl_label", "verb", "learns", "read")}
-        report = {"report": lambda self, kinds, text: said.append((*kinds, text)), "said": said, "confirmed": False}
+        report = {
+            "report": lambda self, kinds, text: reported.append((*kinds, text)),
+            "reported": reported,
+            "confirmed": False,
+        }
         plain = {"take": lambda self, settings: None, "is_adjusted": False}
-        return type("Ran", (LabelOperator,), own | report | plain | properties)()
+        return type("CallableOperator", (LabelOperator,), own | report | plain | properties)()
 
 
-def ended(ran):
-    """How the operator ends, once its job is over."""
-    result, begun = GOING, time.monotonic()
-    while result == GOING:
-        assert time.monotonic() - begun < LONG
+def finish_job(ran):
+    """Step until the job is over; return how the operator ends."""
+    result, begun = RUNNING, time.monotonic()
+    while result == RUNNING:
+        assert time.monotonic() - begun < TIMEOUT
         time.sleep(0.01)
         result = ran.step(bpy.context)
     assert job_holder(bpy.context).job is None
@@ -40,7 +44,7 @@ def ended(ran):
 
 
 def run(operator, **properties):
-    """An operator whose job ran to its end, and how that was."""
-    ran = Ran(operator, **properties)
+    """Run the job of an operator to its end; return the operator and its result."""
+    ran = CallableOperator(operator, **properties)
     ran.begin(bpy.context)
-    return ran, ended(ran)
+    return ran, finish_job(ran)

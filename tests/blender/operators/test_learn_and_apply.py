@@ -31,14 +31,14 @@ def agreement(first, second):
     return (labels_of(first) == labels_of(second)).mean()
 
 
-def test_learn_from_objects_labels_each_of_them_alike(learned, settings):
+def test_learn_from_objects_labels_all_alike(learned, settings):
     assert len(np.unique(labels_of(learned[0]))) == settings.n_segments
     assert min(agreement(learned[0], pose) for pose in learned) > 0.9
     assert all("wks_segment_color" in pose.data.color_attributes for pose in learned)
     assert not any(len(pose.data.materials) for pose in learned)
 
 
-def test_limbs_are_other_parts_than_the_body(learned):
+def test_limbs_and_body_are_different_segments(learned):
     points = np.array([polygon.center for polygon in learned[0].data.polygons])
     labels = labels_of(learned[0])
     tips = [labels[np.argmax(points @ (limb / np.linalg.norm(limb)))] for limb in LIMBS]
@@ -46,7 +46,7 @@ def test_limbs_are_other_parts_than_the_body(learned):
     assert body not in tips
 
 
-def test_learn_from_frames_labels_the_one_mesh_and_keeps_the_frame(settings):
+def test_learn_from_frames_keeps_the_frame(settings):
     obj = limbed_rigged()
     settings.source, settings.pose_count = "FRAMES", 3
     select(obj)
@@ -66,7 +66,7 @@ def test_learn_from_a_range_of_frames(settings, printed):
     assert "2 poses" in settings.model_summary
 
 
-def test_learn_from_shape_keys_labels_the_object_and_keeps_its_keys(settings):
+def test_learn_from_shape_keys_keeps_the_keys(settings):
     obj = limbed_keys(0.4, 0.8)
     obj.active_shape_key_index = 2
     settings.source = "SHAPE_KEYS"
@@ -116,7 +116,7 @@ def test_materials_are_written_only_if_asked_for(learned, settings):
         assert "wks_segment_color" not in pose.data.attributes
 
 
-def test_learn_says_what_happened(settings, printed):
+def test_learn_reports_facts(settings, printed):
     select(*limbed_poses(*BENDS))
     printed()
     OPS.learn()
@@ -125,14 +125,14 @@ def test_learn_says_what_happened(settings, printed):
     assert "Warning" not in said
 
 
-def test_one_pose_is_allowed_with_a_hint(printed):
+def test_one_pose_gives_a_warning(printed):
     select(limbed())
     printed()
     assert OPS.learn() == {"FINISHED"}
     assert "Warning: Learned from one pose only" in printed().out
 
 
-def test_a_fallback_of_the_solver_reaches_the_user(settings, printed, monkeypatch):
+def test_solver_warning_is_reported_once(settings, printed, monkeypatch):
     def refuse(*arguments):
         raise multilevel.NotConvergedError
 
@@ -144,7 +144,7 @@ def test_a_fallback_of_the_solver_reaches_the_user(settings, printed, monkeypatc
     assert printed().out.count("Warning: the fast eigensolver did not converge on this mesh") == 1
 
 
-def test_poses_that_are_all_the_same_give_a_hint(settings, printed):
+def test_equal_poses_give_a_warning(settings, printed):
     select(limbed())
     settings.source, settings.pose_count = "FRAMES", 3
     printed()
@@ -152,14 +152,14 @@ def test_poses_that_are_all_the_same_give_a_hint(settings, printed):
     assert "poses are the same: does an animation move the character" in printed().out
 
 
-def test_unseen_pose_gets_the_labels_of_the_training(learned):
+def test_unseen_pose_gets_the_learned_labels(learned):
     unseen = limbed("Unseen", UNSEEN)
     select(unseen)
     assert OPS.apply() == {"FINISHED"}
     assert agreement(unseen, learned[1]) > 0.9
 
 
-def test_apply_leaves_the_other_objects_and_the_model_alone(learned, settings):
+def test_apply_changes_only_selected_objects(learned, settings):
     unseen = limbed("Unseen", UNSEEN)
     select(unseen)
     before = scene_snapshot()
@@ -187,7 +187,7 @@ def test_apply_takes_a_turned_scaled_and_mirrored_object(learned):
     assert agreement(twin, learned[1]) > 0.95
 
 
-def test_clear_gives_back_what_was(settings):
+def test_clear_restores_everything(settings):
     poses = limbed_poses(*BENDS)
     poses[0].data.materials.append(bpy.data.materials.new("Skin"))
     settings.write_materials = True
@@ -207,13 +207,13 @@ def test_clear_touches_only_what_is_selected(learned):
     assert "wks_segment" in learned[1].data.attributes
 
 
-def test_operators_that_change_something_can_be_undone():
+def test_operators_register_undo():
     for name in ("learn", "apply", "clear", "load_model"):
         cls = getattr(registration, f"WKS_SEGMENT_OT_{name}")
         assert {"REGISTER", "UNDO"} <= cls.bl_options, name
 
 
-def test_undo_gives_back_what_was():
+def test_undo_restores_everything():
     select(limbed())
     bpy.ops.ed.undo_push(message="before")
     before = snapshot(bpy.data.meshes["Limbed"])

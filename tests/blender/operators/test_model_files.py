@@ -22,7 +22,7 @@ pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
 
 
-def test_model_goes_to_a_file_and_comes_back(learned, settings, tmp_path):
+def test_model_is_exported_and_imported(learned, settings, tmp_path):
     path, labels = tmp_path / "model.json", labels_of(learned[0])
     model = settings.model
     assert OPS.save_model(filepath=str(path)) == {"FINISHED"}
@@ -36,7 +36,7 @@ def test_model_goes_to_a_file_and_comes_back(learned, settings, tmp_path):
     assert (labels_of(learned[0]) == labels).mean() > 0.95
 
 
-def test_saved_model_is_one_of_the_core(learned, tmp_path):
+def test_exported_model_can_be_loaded_by_core(learned, tmp_path):
     path = tmp_path / "model.json"
     OPS.save_model(filepath=str(path))
     assert PoseSegmentation.load(path).n_segments == 4
@@ -61,7 +61,7 @@ def test_model_path_may_be_relative_to_the_blend_file(learned, tmp_path):
         (b"", "no JSON"),
     ],
 )
-def test_foreign_model_file_is_refused_and_the_old_model_stays(learned, tmp_path, content, match):
+def test_foreign_model_file_is_refused(learned, tmp_path, content, match):
     path = tmp_path / "foreign.json"
     path.write_bytes(content)
     refuses(OPS.load_model, f"foreign.json.*{match}", filepath=str(path))
@@ -77,7 +77,7 @@ def test_model_file_that_does_not_exist(learned, tmp_path):
     refuses(OPS.load_model, "missing.json was not loaded", filepath=str(tmp_path / "missing.json"))
 
 
-def test_model_of_more_segments_than_there_are_colors(settings, tmp_path):
+def test_model_with_more_segments_than_colors(settings, tmp_path):
     """The core sets no limit. Whether such a model is refused or colored, nothing may stay behind."""
     obj, path = limbed(), tmp_path / "many.json"
     (pose,) = reader.read_objects(bpy.context, [Character((obj,))])
@@ -95,7 +95,7 @@ def test_model_of_more_segments_than_there_are_colors(settings, tmp_path):
     assert changed in ([], ["/model"])
 
 
-def test_folder_in_the_place_of_a_model(learned, tmp_path):
+def test_folder_instead_of_a_model_file(learned, tmp_path):
     refuses(OPS.load_model, "was not loaded", filepath=str(tmp_path))
 
 
@@ -103,7 +103,7 @@ def test_model_that_cannot_be_written(learned, tmp_path):
     refuses(OPS.save_model, "model was not saved", filepath=str(tmp_path / "missing" / "model.json"))
 
 
-def test_model_stays_with_the_blend_file(learned, settings, tmp_path):
+def test_model_is_saved_in_the_blend_file(learned, settings, tmp_path):
     model, summary, labels = settings.model, settings.model_summary, labels_of(learned[0])
     path = tmp_path / "scene.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))

@@ -44,7 +44,7 @@ def test_buttons_are_gray_without_a_selected_mesh(learned, name):
     assert "Select the mesh of a character first" in refusal(getattr(OPS, name))
 
 
-def test_a_selected_armature_stands_for_its_visible_meshes(settings):
+def test_selected_armature_selects_its_visible_meshes(settings):
     body, coat, hidden = limbed_rigged("Body"), limbed("Coat"), limbed("Hidden")
     for obj in (coat, hidden):
         obj.parent = body.parent
@@ -57,7 +57,7 @@ def test_a_selected_armature_stands_for_its_visible_meshes(settings):
     assert [obj.name for obj in selected_meshes(bpy.context)] == ["Coat", "Other"]
 
 
-def test_the_armature_is_all_that_needs_to_be_selected(settings):
+def test_learn_and_apply_through_a_selected_armature(settings):
     obj = limbed_rigged()
     select(obj.parent)
     settings.source, settings.pose_count = "FRAMES", 3
@@ -70,7 +70,7 @@ def test_the_armature_is_all_that_needs_to_be_selected(settings):
     assert (labels_of(obj) == learned).mean() > 0.95
 
 
-def test_clear_through_the_armature_takes_back_a_separation(settings):
+def test_clear_through_a_selected_armature_reverts_separation(settings):
     body, coat = limbed_rigged("Body"), limbed("Coat")
     coat.parent = body.parent
     write_labels(body.data, np.arange(len(body.data.polygons)) % 2)
@@ -86,7 +86,7 @@ def test_clear_through_the_armature_takes_back_a_separation(settings):
     assert all(read_labels(bpy.data.objects[name].data) is None for name in ("Body", "Coat"))
 
 
-def test_the_list_is_of_the_meshes_on_the_selected_armature(settings):
+def test_list_shows_meshes_of_the_selected_armature(settings):
     one, other = limbed_rigged("One"), limbed_rigged("Other")
     for obj in (one, other):
         write_labels(obj.data, np.zeros(len(obj.data.polygons), dtype=np.int64))
@@ -102,12 +102,12 @@ def test_buttons_are_gray_without_a_model(name):
     assert "No model yet" in refusal(getattr(OPS, name))
 
 
-def test_clear_is_gray_where_there_are_no_segments():
+def test_clear_is_gray_without_segments():
     select(limbed())
     assert "Select an object that has segments" in refusal(OPS.clear)
 
 
-def test_clear_is_gray_where_only_the_artist_used_our_name():
+def test_clear_is_gray_for_a_users_property_with_our_name():
     obj = limbed()
     obj.data["wks_segment"] = 1
     select(obj)

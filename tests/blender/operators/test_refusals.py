@@ -65,7 +65,7 @@ def test_object_without_shape_keys(settings):
     refuses(OPS.learn, '"Limbed" has no shape keys')
 
 
-def test_of_several_characters_the_active_one_gives_the_frames(settings):
+def test_active_character_gives_the_frames(settings):
     settings.source = "FRAMES"
     obj, other = limbed_rigged(), limbed("Other")
     select(obj, other)
@@ -76,7 +76,7 @@ def test_of_several_characters_the_active_one_gives_the_frames(settings):
         assert "wks_segment" not in other.data.attributes
 
 
-def test_modifier_without_trace_of_origin_at_a_later_pose(learned):
+def test_modifier_that_hides_the_origin_of_faces(learned):
     learned[2].modifiers.new("Remesh", "REMESH")
     refuses(OPS.learn, '"Pose 2".*modifier')
 
@@ -89,13 +89,13 @@ def test_surface_that_the_core_refuses_is_named(learned):
     refuses(OPS.apply, '"Speck": every face of the mesh collapses')
 
 
-def test_single_triangle_is_too_little_or_enough_but_breaks_nothing(settings):
+def test_single_triangle_is_refused(settings):
     triangle = mesh_object([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)], "Triangle")
     select(triangle)
     refuses(OPS.learn, "1 faces, too few for")
 
 
-def test_more_segments_than_the_surface_has_different_places(settings):
+def test_more_segments_than_distinct_signatures(settings):
     """All signatures of a regular tetrahedron's refined surface repeat 24 times."""
     corners = [(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)]
     solid = mesh_object(corners, [(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)], "Solid")
@@ -111,6 +111,6 @@ def test_more_segments_than_the_surface_has_different_places(settings):
         assert labels_of(solid).max() < 64
 
 
-def test_damaged_model_of_the_file(learned, settings):
+def test_damaged_model_in_the_scene(learned, settings):
     settings.model = settings.model[: len(settings.model) // 2]
     refuses(OPS.apply, "The model in this file cannot be used")

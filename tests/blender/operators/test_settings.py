@@ -38,14 +38,14 @@ def test_settings_reach_the_model(settings):
     assert (model.covariance_type, model.scaling, model.random_state) == ("diag", "raw", 9)
 
 
-def test_defaults_are_those_of_the_paper_and_of_the_core(scene):
+def test_defaults_equal_those_of_core(scene):
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     model = bpy.context.scene.wks_segment.new_model()
     assert vars(model) == vars(PoseSegmentation())
     assert (model.n_eigenpairs, model.n_energies) == (300, 100)
 
 
-def test_automatic_number_shows_its_curve(settings, printed):
+def test_automatic_number_reports_certainty(settings, printed):
     settings.auto_segments = True
     select(*limbed_poses(*BENDS))
     printed()
@@ -61,7 +61,7 @@ def test_automatic_number_shows_its_curve(settings, printed):
     assert said.index(line) < said.index("Learned: 3 poses")
 
 
-def test_automatic_number_survives_a_file_and_apply(settings, tmp_path):
+def test_automatic_number_is_kept_by_export_and_apply(settings, tmp_path):
     settings.auto_segments = True
     first, other = limbed_poses(*BENDS[:2])
     select(first)
@@ -76,7 +76,7 @@ def test_automatic_number_survives_a_file_and_apply(settings, tmp_path):
     assert labels_of(other).max() < 16
 
 
-def test_a_number_that_was_given_shows_no_curve(learned, settings):
+def test_fixed_number_reports_no_certainty(learned, settings):
     assert "Certainty" not in settings.model_summary
 
 
@@ -104,7 +104,7 @@ def drawn(panel):
 
 
 @pytest.mark.parametrize("automatic", [False, True])
-def test_number_is_gray_where_it_is_automatic(settings, automatic):
+def test_number_is_gray_when_automatic(settings, automatic):
     settings.auto_segments = automatic
     column = drawn(main_panel.WKS_SEGMENT_PT_main).column.return_value
     column.prop.assert_any_call(settings, "auto_segments")
@@ -129,7 +129,7 @@ def test_outputs_can_be_chosen_in_the_panel(settings, materials):
     drawn(main_panel.WKS_SEGMENT_PT_bake).operator.assert_called_once_with("wks_segment.bake", icon="RENDER_STILL")
 
 
-def test_panel_breaks_long_lines_and_keeps_pairs_together(settings):
+def test_panel_wraps_lines_and_keeps_pairs_together(settings):
     settings.model = "{}"
     settings.model_summary = "From Fox\nCertainty by segments: " + " · ".join(f"{i} 0.91" for i in range(2, 17))
     labels = drawn(models_panel.WKS_SEGMENT_PT_models).column.return_value.label.call_args_list
@@ -139,7 +139,7 @@ def test_panel_breaks_long_lines_and_keeps_pairs_together(settings):
     assert all(line.count("\N{NO-BREAK SPACE}") == line.count("0.91") for line in lines)
 
 
-def test_panel_sits_in_the_sidebar_under_its_own_tab():
+def test_panel_has_its_own_tab_in_the_sidebar():
     main = main_panel.CLASSES[0]
     assert (main.bl_space_type, main.bl_region_type, main.bl_category) == ("VIEW_3D", "UI", "WKS")
     for child in main_panel.CLASSES[1:]:

@@ -29,7 +29,7 @@ def test_menu_has_the_operators_for_objects():
     assert {"wks_segment.learn", "wks_segment.apply", "wks_segment.bake", "wks_segment.segments_from"} <= named
 
 
-def test_menu_is_in_blenders_own_and_goes_with_the_extension(extension):
+def test_menu_is_in_the_object_menu_while_enabled(extension):
     functions = bpy.types.VIEW3D_MT_object.draw._draw_funcs
     assert functions.count(menu.draw_in_object_menu) == 1
     extension.unregister()
@@ -57,7 +57,7 @@ def made(path):
     return str(path)
 
 
-def test_preset_brings_settings_back(settings, user_folder):
+def test_preset_restores_settings(settings, user_folder):
     settings.n_segments, settings.sides, settings.snap_to, settings.smoothness = 11, "two", {"seams"}, 2.5
     settings.model_summary = "of this file"
     assert bpy.ops.wks_segment.add_preset(name="Hero") == {"FINISHED"}
@@ -70,5 +70,5 @@ def test_preset_brings_settings_back(settings, user_folder):
     assert settings.model_summary == "of another file"
 
 
-def test_presets_are_of_settings_that_there_are(settings):
+def test_preset_settings_exist(settings):
     assert set(presets.PRESET_SETTINGS) <= set(settings.bl_rna.properties.keys())

@@ -39,7 +39,7 @@ def rest(session):
     assert session.on_timer() is None
 
 
-def test_what_is_shown_is_not_written(walker, settings, session):
+def test_preview_is_not_written(walker, settings, session):
     before, model = snapshot(walker.data), settings.model
     settings.n_segments = 2
     rest(session)
@@ -49,7 +49,7 @@ def test_what_is_shown_is_not_written(walker, settings, session):
     assert settings.model == model
 
 
-def test_accept_writes_what_was_shown(walker, settings, session):
+def test_accept_writes_the_preview(walker, settings, session):
     settings.n_segments = 2
     rest(session)
     shown = next(iter(session.proposed[1].labels.values()))
@@ -62,7 +62,7 @@ def test_accept_writes_what_was_shown(walker, settings, session):
     assert not OPS.accept.poll()
 
 
-def test_discard_takes_back_the_settings(walker, settings, session):
+def test_discard_restores_settings(walker, settings, session):
     before = snapshot(walker.data)
     settings.n_segments, settings.smoothness, settings.snap_to = 2, 2.0, {"sharp"}
     rest(session)
@@ -85,7 +85,7 @@ def test_accept_can_be_undone(walker, settings, session):
     np.testing.assert_array_equal(labels_of(bpy.data.objects["Walker"]), before)
 
 
-def test_undo_shows_nothing_any_more(walker, settings, session):
+def test_undo_hides_the_preview(walker, settings, session):
     bpy.ops.ed.undo_push(message="before")
     settings.n_segments = 2
     rest(session)
@@ -96,7 +96,7 @@ def test_undo_shows_nothing_any_more(walker, settings, session):
 
 
 @pytest.mark.parametrize("how", ["learn", "load", "edit"])
-def test_what_is_shown_goes_when_it_is_of_yesterday(walker, settings, session, how, tmp_path):
+def test_outdated_preview_is_hidden(walker, settings, session, how, tmp_path):
     settings.n_segments = 2
     rest(session)
     if how == "learn":
@@ -113,7 +113,7 @@ def test_what_is_shown_goes_when_it_is_of_yesterday(walker, settings, session, h
     assert not session.preview.shown
 
 
-def test_the_picture_is_of_what_is_seen(walker, settings, session):
+def test_preview_matches_the_evaluated_surface(walker, settings, session):
     """At another frame, through a modifier, a little above the surface, in the colors of the parts, shaded."""
     walker.modifiers.new("Fine", "SUBSURF").levels = 1
     bpy.context.scene.frame_set(11)
@@ -134,7 +134,7 @@ def test_the_picture_is_of_what_is_seen(walker, settings, session):
     assert DARKEST_SHADE - 1e-6 <= shade.min() < shade.max() <= 1 + 1e-6
 
 
-def test_nothing_is_shown_of_what_is_not_there():
+def test_preview_of_nothing_is_empty():
     places, colors = preview_triangles(bpy.context, {})
     assert places.shape == (0, 3)
     assert colors.shape == (0, 4)

@@ -6,7 +6,7 @@ import bpy
 import pytest
 from builders import limbed, limbed_poses, limbed_rigged, select
 from height_bands import write
-from running_jobs import GOING, LEARN, LONG, Ran
+from running_jobs import LEARN, RUNNING, TIMEOUT, CallableOperator
 
 from wks_segment.blender.workflow.background_job import BackgroundJob
 from wks_segment.blender.workflow.live_session import session_of
@@ -25,7 +25,7 @@ def pair(settings):
 
 @pytest.fixture
 def poses(settings):
-    """Three objects in three poses, all of what can be written asked for."""
+    """Three objects in three poses, selected, with sides, soft groups and materials in the settings."""
     settings.sides, settings.vertex_groups, settings.write_materials = "two", "soft", True
     made = limbed_poses(0.0, 0.3, 0.6)
     select(*made)
@@ -33,9 +33,9 @@ def poses(settings):
 
 
 @pytest.fixture
-def at(monkeypatch):
-    """A function that holds the next job at a stage, and gives its operator and a function that lets it go on."""
-    goes_on = threading.Event()
+def hold_at(monkeypatch):
+    """A function that holds the next job at a stage; it returns the operator and a function that lets the job go on."""
+    go_on_event = threading.Event()
 
     def hold(stage, operator=LEARN, **properties):
         reached, original = threading.Event(), BackgroundJob._report
@@ -43,18 +43,18 @@ def at(monkeypatch):
         def progress(self, now, share):
             if now.startswith(stage) and not reached.is_set():
                 reached.set()
-                assert goes_on.wait(LONG)
+                assert go_on_event.wait(TIMEOUT)
             original(self, now, share)
 
         monkeypatch.setattr(BackgroundJob, "_report", progress)
-        ran = Ran(operator, **properties)
+        ran = CallableOperator(operator, **properties)
         ran.begin(bpy.context)
-        assert reached.wait(LONG)
-        assert ran.step(bpy.context) == GOING
-        return ran, goes_on.set
+        assert reached.wait(TIMEOUT)
+        assert ran.step(bpy.context) == RUNNING
+        return ran, go_on_event.set
 
     yield hold
-    goes_on.set()
+    go_on_event.set()
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import bpy
 import pytest
 from builders import changes, labels_of, limbed, mesh_object, scene_snapshot, select, snapshot
-from running_jobs import APPLY, GOING, LEARN, LONG, OPS, Ran, ended, run
+from running_jobs import APPLY, LEARN, OPS, RUNNING, TIMEOUT, CallableOperator, finish_job, run
 
 from wks_segment.blender.errors import ChangedError, UserError
 from wks_segment.blender.ui import main_panel
@@ -26,7 +26,7 @@ STAGES = ["Starting", "Seams", "Signature", "Learning", "Labels", "Left and righ
 
 @pytest.mark.usefixtures("learns_anew")
 @pytest.mark.parametrize("sides", ["one", "two"])
-def test_job_writes_what_a_script_gets(poses, settings, sides, tmp_path):
+def test_job_writes_the_same_as_a_script(poses, settings, sides, tmp_path):
     settings.sides = sides
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "before.blend"))
 
@@ -42,17 +42,17 @@ def test_job_writes_what_a_script_gets(poses, settings, sides, tmp_path):
         return found
 
     scripted = after(OPS.learn, OPS.apply)
-    ended_so = []
-    threaded = after(lambda: ended_so.append(run(LEARN)), lambda: ended_so.append(run(APPLY)))
+    results = []
+    threaded = after(lambda: results.append(run(LEARN)), lambda: results.append(run(APPLY)))
     assert scripted["learned"]["model"]
     assert not changes(scripted, threaded)
-    assert [result for _, result in ended_so] == [{"FINISHED"}] * 2
-    texts = [[text for kind, text in ran.said if kind == "INFO"][-1] for ran, _ in ended_so]
+    assert [result for _, result in results] == [{"FINISHED"}] * 2
+    texts = [[text for kind, text in ran.reported if kind == "INFO"][-1] for ran, _ in results]
     assert texts[0].startswith("Learned: 3 poses, 1,926 vertices, 4 segments")
     assert texts[1].startswith("Applied: 3 poses, 1,926 vertices, 4 segments")
 
 
-def test_undo_after_a_job_gives_back_what_was(poses):
+def test_undo_after_a_job_restores_meshes(poses):
     names = [pose.data.name for pose in poses]
     bpy.ops.ed.undo_push(message="before")
     before = {name: snapshot(bpy.data.meshes[name]) for name in names}
@@ -66,7 +66,7 @@ def test_undo_after_a_job_gives_back_what_was(poses):
     assert "wks_segment" in bpy.data.meshes[names[0]].attributes
 
 
-def test_nothing_of_blender_is_needed_between_reading_and_writing(poses):
+def test_job_computes_without_its_file(poses):
     job = SegmentationJob.learning(bpy.context, MemoryCache())
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     before = scene_snapshot()
@@ -76,94 +76,94 @@ def test_nothing_of_blender_is_needed_between_reading_and_writing(poses):
     assert not changes(before, scene_snapshot())
 
 
-def test_settings_are_those_that_were_there_when_it_began(poses, settings, at):
-    ran, go_on = at("Seams")
+def test_job_uses_settings_from_its_start(poses, settings, hold_at):
+    ran, go_on = hold_at("Seams")
     settings.write_colors = settings.write_materials = False
     settings.vertex_groups, settings.n_segments = "none", 2
     go_on()
-    assert ended(ran) == {"FINISHED"}
+    assert finish_job(ran) == {"FINISHED"}
     assert poses[0].data.color_attributes.active_color_name == "wks_segment_color"
     assert len(poses[0].data.materials) > 2
     assert len(poses[0].vertex_groups) > 2
 
 
-def test_model_goes_to_the_scene_that_it_was_learned_in(poses, settings, at):
-    ran, go_on = at("Labels")
+def test_model_is_stored_in_the_scene_of_the_job(poses, settings, hold_at):
+    ran, go_on = hold_at("Labels")
     other = bpy.data.scenes.new("Other")
     bpy.context.window.scene = other
     go_on()
-    assert ended(ran) == {"FINISHED"}
+    assert finish_job(ran) == {"FINISHED"}
     assert bpy.data.scenes["Scene"].wks_segment.model
     assert not other.wks_segment.model
 
 
-def test_renamed_object_is_found(poses, at):
-    ran, go_on = at("Learning")
+def test_renamed_object_is_written(poses, hold_at):
+    ran, go_on = hold_at("Learning")
     poses[0].name = "Another"
     go_on()
-    assert ended(ran) == {"FINISHED"}
+    assert finish_job(ran) == {"FINISHED"}
     assert len(labels_of(poses[0])) == 1280
 
 
-def test_writing_waits_until_blender_can_undo_it(poses, at):
+def test_writing_waits_for_object_mode(poses, hold_at):
     other = limbed("Other")
-    ran, go_on = at("Labels")
+    ran, go_on = hold_at("Labels")
     select(other)
     bpy.ops.object.mode_set(mode="EDIT")
     go_on()
-    ran.job.wait(LONG)
+    ran.job.wait(TIMEOUT)
     for _ in range(3):
-        assert ran.step(bpy.context) == GOING
+        assert ran.step(bpy.context) == RUNNING
     assert ran.job.stage == "Done, to be written in Object Mode"
     assert "wks_segment" not in poses[0].data.attributes
     bpy.ops.object.mode_set(mode="OBJECT")
-    assert ended(ran) == {"FINISHED"}
+    assert finish_job(ran) == {"FINISHED"}
     assert "wks_segment" in poses[0].data.attributes
 
 
 @pytest.mark.usefixtures("learns_anew")
 @pytest.mark.parametrize("stage", STAGES)
-def test_escape_ends_it_at_every_stage_and_nothing_is_written(poses, at, stage):
+def test_escape_cancels_at_every_stage(poses, hold_at, stage):
     before = scene_snapshot()
-    ran, go_on = at(stage)
-    assert ran.modal(bpy.context, SimpleNamespace(type="MOUSEMOVE", value="NOTHING")) == GOING
+    ran, go_on = hold_at(stage)
+    assert ran.modal(bpy.context, SimpleNamespace(type="MOUSEMOVE", value="NOTHING")) == RUNNING
     assert ran.modal(bpy.context, SimpleNamespace(type="ESC", value="PRESS")) == {"RUNNING_MODAL"}
     assert main_panel.job_texts(ran.job) == ("Canceling", "")
     go_on()
-    assert ended(ran) == {"CANCELLED"}
-    assert ran.said == [("WARNING", "Learn and Segment was canceled, nothing is written")]
+    assert finish_job(ran) == {"CANCELLED"}
+    assert ran.reported == [("WARNING", "Learn and Segment was canceled, nothing is written")]
     assert not changes(before, scene_snapshot())
 
 
 @pytest.mark.parametrize("stage", ["Signature", "Labels", "Weights"])
-def test_button_ends_applying(poses, at, stage):
+def test_cancel_button_ends_apply(poses, hold_at, stage):
     OPS.learn()
     before = scene_snapshot()
-    ran, go_on = at(stage, APPLY)
+    ran, go_on = hold_at(stage, APPLY)
     assert OPS.cancel() == {"FINISHED"}
     go_on()
-    assert ended(ran) == {"CANCELLED"}
-    assert ran.said == [("WARNING", "Apply to Selected was canceled, nothing is written")]
+    assert finish_job(ran) == {"CANCELLED"}
+    assert ran.reported == [("WARNING", "Apply to Selected was canceled, nothing is written")]
     assert not changes(before, scene_snapshot())
 
 
-def test_button_is_gray_where_no_job_runs():
+def test_cancel_button_is_gray_without_a_job():
     assert not OPS.cancel.poll()
     with pytest.raises(RuntimeError, match="No job is running"):
         OPS.cancel()
 
 
-def test_second_job_is_refused_and_the_first_goes_on(poses, at):
-    ran, go_on = at("Signature")
+def test_second_job_is_refused(poses, hold_at):
+    ran, go_on = hold_at("Signature")
     for operator in (OPS.learn, OPS.apply):
         bpy.context.scene.wks_segment.model = "something"
         assert not operator.poll()
         with pytest.raises(RuntimeError, match=JOB_RUNNING):
             operator()
     with pytest.raises(UserError, match=JOB_RUNNING):
-        Ran(LEARN).begin(bpy.context)
+        CallableOperator(LEARN).begin(bpy.context)
     go_on()
-    assert ended(ran) == {"FINISHED"}
+    assert finish_job(ran) == {"FINISHED"}
     assert OPS.learn.poll()
 
 
@@ -237,20 +237,20 @@ def redone():
         (redone, "a step was undone or redone"),
     ],
 )
-def test_what_takes_away_its_meshes_ends_it(poses, at, happens, reason, stage):
+def test_changed_scene_ends_the_job(poses, hold_at, happens, reason, stage):
     bpy.ops.ed.undo_push(message="first")
     bpy.data.objects["Pose 2"].location.x = 3
     bpy.ops.ed.undo_push(message="moved")
     if happens is redone:
         undone()
-    ran, go_on = at(stage)
+    ran, go_on = hold_at(stage)
     happens()
     after = scene_snapshot()
-    assert ran.step(bpy.context) == GOING
+    assert ran.step(bpy.context) == RUNNING
     go_on()
-    assert ended(ran) == {"CANCELLED"}
-    message = f"Learn and Segment was ended, nothing is written: {reason}"
-    assert ran.said == [("WARNING", message)]
+    assert finish_job(ran) == {"CANCELLED"}
+    message = f"Learn and Segment was finish_job, nothing is written: {reason}"
+    assert ran.reported == [("WARNING", message)]
     assert job_holder(bpy.context).message == message
     assert not changes(after, scene_snapshot())
     if bpy.context.mode != "OBJECT":
@@ -258,29 +258,29 @@ def test_what_takes_away_its_meshes_ends_it(poses, at, happens, reason, stage):
 
 
 @pytest.mark.usefixtures("learns_anew")
-def test_blender_that_takes_the_window_away_ends_it(poses, at):
+def test_closed_window_ends_the_job(poses, hold_at):
     before = scene_snapshot()
-    ran, go_on = at("Learning")
+    ran, go_on = hold_at("Learning")
     ran.cancel(bpy.context)
     assert job_holder(bpy.context).job is None
     assert "its window was closed" in job_holder(bpy.context).message
     go_on()
-    ran.job.wait(LONG)
+    ran.job.wait(TIMEOUT)
     assert not ran.job.succeeded
     assert not changes(before, scene_snapshot())
     assert OPS.learn() == {"FINISHED"}
 
 
 @pytest.mark.usefixtures("learns_anew")
-def test_extension_that_is_disabled_ends_it(poses, at, extension, monkeypatch):
+def test_disabled_extension_ends_the_job(poses, hold_at, extension, monkeypatch):
     monkeypatch.setattr(background_job, "EXIT_WAIT", 0.1)
     meshes = {pose.name: snapshot(pose.data) for pose in poses}
-    ran, go_on = at("Learning")
+    ran, go_on = hold_at("Learning")
     extension.unregister()
     try:
         assert not changes(meshes, {pose.name: snapshot(pose.data) for pose in poses})
         go_on()
-        ran.job.wait(LONG)
+        ran.job.wait(TIMEOUT)
         with pytest.raises(UserError, match="the extension was disabled"):
             ran.job.result()
         for handlers in (bpy.app.handlers.load_pre, bpy.app.handlers.undo_pre, bpy.app.handlers.redo_pre):
@@ -291,7 +291,7 @@ def test_extension_that_is_disabled_ends_it(poses, at, extension, monkeypatch):
     assert not changes({}, {mesh.name: 1 for mesh in bpy.data.meshes})
 
 
-def test_blender_that_is_quit_does_not_wait():
+def test_quitting_blender_does_not_wait_for_a_job():
     code = """if True:
         import sys, threading
         import bpy
@@ -308,42 +308,42 @@ def test_blender_that_is_quit_does_not_wait():
         [sys.executable, "-c", code],
         capture_output=True,
         text=True,
-        timeout=LONG,
+        timeout=TIMEOUT,
         env=os.environ | {"PYTHONPATH": str(root)},
     )
     assert "on the way out" in done.stdout, done.stderr
 
 
-def test_error_in_the_thread_is_the_same_as_without_one(settings):
+def test_error_in_the_thread_is_reported(settings):
     select(limbed(), mesh_object([(0, 0, 0), (1, 0, 0), (1, 1e-7, 0)], [(0, 1, 2)], "Speck"))
     with pytest.raises(RuntimeError) as caught:
         OPS.learn()
     before = scene_snapshot()
     ran, result = run(LEARN)
     assert result == {"CANCELLED"}
-    ((kind, text),) = ran.said
+    ((kind, text),) = ran.reported
     assert (kind, text in str(caught.value)) == ("ERROR", True)
     assert text.startswith('"Speck": every face of the mesh collapses')
     assert not changes(before, scene_snapshot())
     assert OPS.learn.poll()
 
 
-def test_defect_of_ours_is_no_silence(poses, monkeypatch):
+def test_unexpected_error_is_raised(poses, monkeypatch):
     monkeypatch.setattr(SegmentationJob, "compute", lambda self, progress: 1 / 0)
-    ran = Ran(LEARN)
+    ran = CallableOperator(LEARN)
     ran.begin(bpy.context)
     with pytest.raises(ZeroDivisionError):
-        ended(ran)
+        finish_job(ran)
     assert job_holder(bpy.context).job is None
     assert ran.modal(bpy.context, SimpleNamespace(type="TIMER", value="NOTHING")) == {"CANCELLED"}
 
 
-def test_what_others_warn_of_meanwhile_is_theirs(poses, at):
+def test_other_warnings_are_passed_on(poses, hold_at):
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
-        ran, go_on = at("Signature")
+        ran, go_on = hold_at("Signature")
         warnings.warn("of another extension", stacklevel=1)
         go_on()
-        assert ended(ran) == {"FINISHED"}
+        assert finish_job(ran) == {"FINISHED"}
     assert [str(warning.message) for warning in said] == ["of another extension"]
-    assert not any("of another extension" in text for _, text in ran.said)
+    assert not any("of another extension" in text for _, text in ran.reported)

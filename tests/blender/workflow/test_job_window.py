@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from builders import limbed, select
-from running_jobs import GOING, LEARN, LONG, OPS, Ran, ended
+from running_jobs import LEARN, OPS, RUNNING, TIMEOUT, CallableOperator, finish_job
 
 from wks_segment.blender.errors import TooLargeError
 from wks_segment.blender.operators import _report
@@ -42,31 +42,31 @@ def window(monkeypatch):
     return Window()
 
 
-def test_button_starts_a_job_and_the_window_tells_the_time(poses, window):
-    ran = Ran(LEARN)
+def test_button_starts_a_job_with_a_timer(poses, window):
+    ran = CallableOperator(LEARN)
     assert ran.invoke(window, None) == {"RUNNING_MODAL"}
     window.window_manager.event_timer_add.assert_called_once_with(background_job.TIMER_INTERVAL, window=window.window)
     window.window_manager.modal_handler_add.assert_called_once_with(ran)
-    result, begun = GOING, time.monotonic()
-    while result == GOING and time.monotonic() - begun < LONG:
+    result, begun = RUNNING, time.monotonic()
+    while result == RUNNING and time.monotonic() - begun < TIMEOUT:
         time.sleep(0.01)
         result = ran.modal(window, SimpleNamespace(type="TIMER", value="NOTHING"))
     assert result == {"FINISHED"}
     assert "wks_segment" in poses[0].data.attributes
 
 
-def test_without_a_window_the_button_does_all_at_once(poses):
+def test_button_runs_at_once_without_a_window(poses):
     assert bpy.app.background
     assert OPS.learn("INVOKE_DEFAULT") == {"FINISHED"}
     assert "wks_segment" in poses[0].data.attributes
     assert job_holder(bpy.context).job is None
 
 
-def test_large_job_is_asked_about_and_then_runs(poses, settings, window):
+def test_large_job_runs_after_the_question(poses, settings, window):
     settings.limit_memory = 1e-6
     with pytest.raises(TooLargeError):
-        Ran(LEARN).begin(window)
-    ran = Ran(LEARN)
+        CallableOperator(LEARN).begin(window)
+    ran = CallableOperator(LEARN)
     assert ran.invoke(window, "event") == {"RUNNING_MODAL"}
     assert job_holder(bpy.context).job is None
     ((asked, event), options) = window.window_manager.invoke_confirm.call_args
@@ -75,18 +75,18 @@ def test_large_job_is_asked_about_and_then_runs(poses, settings, window):
     window.window_manager.modal_handler_add.assert_not_called()
     assert ran.execute(window) == {"RUNNING_MODAL"}
     window.window_manager.modal_handler_add.assert_called_once_with(ran)
-    assert ended(ran) == {"FINISHED"}
+    assert finish_job(ran) == {"FINISHED"}
     # From the panel that adjusts the last operation, it is a script's again.
     assert ran.execute(bpy.context) == {"FINISHED"}
 
 
-def test_refusal_in_the_window_is_told(settings, window):
+def test_refusal_is_reported_in_the_window(settings, window):
     settings.source = "SHAPE_KEYS"
     select(limbed())
-    ran = Ran(LEARN)
+    ran = CallableOperator(LEARN)
     assert ran.invoke(window, None) == {"CANCELLED"}
-    assert ran.said[0][0] == "ERROR"
-    assert '"Limbed" has no shape keys' in ran.said[0][1]
+    assert ran.reported[0][0] == "ERROR"
+    assert '"Limbed" has no shape keys' in ran.reported[0][1]
     window.window_manager.modal_handler_add.assert_not_called()
 
 
@@ -98,9 +98,9 @@ def drawn():
     return layout.column.return_value
 
 
-def test_panel_shows_how_far_it_is_and_why_it_ended(poses, at):
+def test_panel_shows_progress_and_why_a_job_ended(poses, hold_at):
     assert not drawn().row.return_value.progress.called
-    ran, go_on = at("Signature")
+    ran, go_on = hold_at("Signature")
     job = job_holder(bpy.context).job
     job.stage, job.share = 'Signature of "Fox, frame 12" (3 of 5)', 0.375
     column = drawn()
@@ -110,7 +110,7 @@ def test_panel_shows_how_far_it_is_and_why_it_ended(poses, at):
     assert column.row.return_value.operator.call_args.args == ("wks_segment.cancel",)
     OPS.cancel()
     go_on()
-    ended(ran)
+    finish_job(ran)
     column = drawn()
     lines = [call.kwargs["text"] for call in column.label.call_args_list]
     assert " ".join(lines) == "Learn and Segment was canceled, nothing is written"

@@ -13,7 +13,7 @@ pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
 
 
-def test_a_second_run_computes_no_signature(walker, settings, fits):
+def test_signatures_are_computed_once(walker, settings, fits):
     OPS.clear()
     settings.n_segments = 3
     assert OPS.learn() == {"FINISHED"}
@@ -21,14 +21,14 @@ def test_a_second_run_computes_no_signature(walker, settings, fits):
     assert len(np.unique(labels_of(walker))) == 3
 
 
-def test_a_moved_vertex_is_another_mesh(walker, fits):
+def test_moved_vertex_needs_new_signatures(walker, fits):
     walker.data.vertices[5].co.x += 0.01
     assert OPS.learn() == {"FINISHED"}
     assert fits == {"fit": 1, "describe": 2}
 
 
 @pytest.mark.parametrize(("name", "value"), [("smoothness", 0.0), ("min_share", 8.0), ("n_segments", 3)])
-def test_labels_follow_a_setting_and_are_those_of_apply(walker, settings, session, fits, name, value):
+def test_labels_follow_settings_and_equal_the_stored_models(walker, settings, session, fits, name, value):
     before = labels_of(walker)
     setattr(settings, name, value)
     np.testing.assert_array_equal(labels_of(walker), before)  # not while the user drags
@@ -47,7 +47,7 @@ def test_labels_follow_a_setting_and_are_those_of_apply(walker, settings, sessio
     np.testing.assert_array_equal(follows, again)
 
 
-def test_sides_follow(session, settings):
+def test_labels_follow_sides(session, settings):
     from wks_segment.blender.cli import creature
 
     obj = creature.build_creature(bpy.context.scene)
@@ -66,7 +66,7 @@ def test_sides_follow(session, settings):
     np.testing.assert_array_equal(labels_of(obj), one)
 
 
-def test_the_number_that_was_learned_comes_back_as_it_was(walker, settings, session):
+def test_learned_number_of_segments_can_be_restored(walker, settings, session):
     before, model = labels_of(walker), settings.model
     for number in (2, 6, 4):
         settings.n_segments = number
@@ -75,7 +75,7 @@ def test_the_number_that_was_learned_comes_back_as_it_was(walker, settings, sess
     assert settings.model == model
 
 
-def test_one_segment_more_leaves_the_others_their_numbers(walker, settings, session):
+def test_additional_segment_keeps_numbers_of_the_others(walker, settings, session):
     settings.n_segments = 2
     rest(session)
     before = labels_of(walker)
@@ -87,7 +87,7 @@ def test_one_segment_more_leaves_the_others_their_numbers(walker, settings, sess
     assert (after == before)[others].mean() > 0.9  # borders move a little
 
 
-def test_a_changed_seed_needs_nothing(walker, settings, session):
+def test_changed_seed_changes_nothing(walker, settings, session):
     before = snapshot(walker.data)
     settings.random_state = 5
     rest(session)
@@ -95,7 +95,7 @@ def test_a_changed_seed_needs_nothing(walker, settings, session):
     assert session.is_current(bpy.context.scene)
 
 
-def test_what_was_applied_follows_and_the_model_with_it(walker, settings, session, fits):
+def test_applied_labels_and_model_follow(walker, settings, session, fits):
     other = limbed_poses(0.7)[0]
     select(other)
     assert OPS.apply() == {"FINISHED"}
@@ -109,7 +109,7 @@ def test_what_was_applied_follows_and_the_model_with_it(walker, settings, sessio
     assert fits["fit"] == 0
 
 
-def test_a_number_in_the_settings_that_the_model_never_had_changes_nothing(walker, settings, session):
+def test_smoothness_keeps_the_models_number_of_segments(walker, settings, session):
     """A model of four segments is applied while the setting says seven: smoothness alone must not make it seven."""
     settings.live, settings.n_segments = False, 7
     assert OPS.apply() == {"FINISHED"}
@@ -118,7 +118,7 @@ def test_a_number_in_the_settings_that_the_model_never_had_changes_nothing(walke
     assert labels_of(walker).max() == 3
 
 
-def test_each_object_follows_where_objects_are_poses(session, settings):
+def test_all_objects_follow_when_objects_are_poses(session, settings):
     poses = limbed_poses(0.0, 0.5, 1.0)
     select(*poses)
     assert OPS.learn() == {"FINISHED"}
@@ -127,7 +127,7 @@ def test_each_object_follows_where_objects_are_poses(session, settings):
     assert [set(labels_of(obj)) for obj in poses] == [{0, 1}] * 3
 
 
-def test_other_outputs_are_written_again(walker, settings, session):
+def test_other_outputs_follow(walker, settings, session):
     settings.vertex_groups, settings.write_materials = "soft", True
     assert OPS.learn() == {"FINISHED"}
     settings.n_segments = 3
@@ -137,7 +137,7 @@ def test_other_outputs_are_written_again(walker, settings, session):
     assert len(walker.data.materials) == 3
 
 
-def test_nothing_follows_when_it_is_off_and_update_does_it(walker, settings, session):
+def test_labels_do_not_follow_without_live_but_update_works(walker, settings, session):
     before = labels_of(walker)
     settings.live = False
     settings.n_segments = 2
@@ -147,7 +147,7 @@ def test_nothing_follows_when_it_is_off_and_update_does_it(walker, settings, ses
     assert set(labels_of(walker)) == {0, 1}
 
 
-def test_nothing_follows_by_itself_where_it_takes_long(walker, settings, session, monkeypatch):
+def test_slow_labels_do_not_follow_but_update_works(walker, settings, session, monkeypatch):
     session.job.report.seconds["label"] = 6.0
     settings.n_segments = 2
     assert not bpy.app.timers.is_registered(session.timer)
@@ -155,7 +155,7 @@ def test_nothing_follows_by_itself_where_it_takes_long(walker, settings, session
     assert set(labels_of(walker)) == {0, 1}
 
 
-def test_settings_that_come_to_rest_are_waited_for(walker, settings, session):
+def test_timer_waits_until_settings_rest(walker, settings, session):
     settings.n_segments = 2
     assert bpy.app.timers.is_registered(session.timer)
     assert 0 < session.on_timer() <= module.QUIET_SECONDS
@@ -163,7 +163,7 @@ def test_settings_that_come_to_rest_are_waited_for(walker, settings, session):
     bpy.app.timers.unregister(session.timer)
 
 
-def test_an_edited_mesh_is_left_alone(walker, settings, session):
+def test_edited_mesh_is_not_written(walker, settings, session):
     walker.data.vertices[3].co.z += 0.1
     before = snapshot(walker.data)
     settings.n_segments = 2
@@ -173,7 +173,7 @@ def test_an_edited_mesh_is_left_alone(walker, settings, session):
     assert session.job is None
 
 
-def test_a_removed_object_is_forgotten(walker, settings, session):
+def test_removed_object_drops_the_job(walker, settings, session):
     bpy.data.objects.remove(walker)
     settings.n_segments = 2
     rest(session)
@@ -181,7 +181,7 @@ def test_a_removed_object_is_forgotten(walker, settings, session):
     assert session.job is None
 
 
-def test_in_edit_mode_nothing_follows_until_it_is_left(walker, settings, session):
+def test_labels_do_not_follow_in_edit_mode(walker, settings, session):
     bpy.ops.object.mode_set(mode="EDIT")
     settings.n_segments = 2
     rest(session)
@@ -192,7 +192,7 @@ def test_in_edit_mode_nothing_follows_until_it_is_left(walker, settings, session
 
 
 @pytest.mark.parametrize("how", ["clear", "load_model"])
-def test_after_clear_or_another_model_nothing_follows(walker, settings, session, tmp_path, how):
+def test_labels_do_not_follow_after_clear_or_another_model(walker, settings, session, tmp_path, how):
     OPS.save_model(filepath=str(tmp_path / "model.json"))
     if how == "clear":
         OPS.clear()
@@ -204,7 +204,7 @@ def test_after_clear_or_another_model_nothing_follows(walker, settings, session,
     assert not changes(before, snapshot(walker.data))
 
 
-def test_another_file_forgets_the_work(walker, session, tmp_path):
+def test_opening_a_file_drops_the_job(walker, session, tmp_path):
     path = str(tmp_path / "kept.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
@@ -215,7 +215,7 @@ def test_another_file_forgets_the_work(walker, session, tmp_path):
     assert not OPS.update.poll()
 
 
-def test_the_papers_setting_cannot_be_cut_otherwise_but_smoothed_settings_hold(session, settings):
+def test_paper_method_keeps_its_number_of_segments(session, settings):
     obj = limbed_rigged()
     select(obj)
     settings.source, settings.pose_count, settings.preset = "FRAMES", 2, "paper"
@@ -227,7 +227,7 @@ def test_the_papers_setting_cannot_be_cut_otherwise_but_smoothed_settings_hold(s
     assert "takes a new Learn and Segment" in session.message
 
 
-def test_what_is_too_large_is_not_kept(session, settings, monkeypatch):
+def test_large_job_is_not_kept(session, settings, monkeypatch):
     monkeypatch.setattr(module, "MAX_KEPT_BYTES", 1000)
     obj = limbed_rigged()
     select(obj)

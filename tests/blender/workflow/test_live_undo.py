@@ -12,7 +12,7 @@ pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
 
 
-def test_a_change_can_be_undone_by_itself_and_redone(walker, settings, session):
+def test_followed_change_is_undone_and_redone_alone(walker, settings, session):
     bpy.ops.ed.undo_push(message="learned")
     name, four = walker.name, labels_of(walker)
     settings.n_segments = 2
@@ -32,7 +32,7 @@ def test_a_change_can_be_undone_by_itself_and_redone(walker, settings, session):
     assert labels_of(bpy.data.objects[name]).max() == 2
 
 
-def test_undo_leaves_a_setting_that_labels_do_not_follow(walker, settings, session):
+def test_undo_keeps_settings_when_live_is_off(walker, settings, session):
     settings.live, settings.n_segments, settings.snap_to = False, 2, {"sharp"}
     bpy.ops.ed.undo_push(message="settings")
     walker.location.x = 1
@@ -42,7 +42,7 @@ def test_undo_leaves_a_setting_that_labels_do_not_follow(walker, settings, sessi
     assert bpy.context.scene.wks_segment.snap_to == {"sharp"}
 
 
-def test_undo_of_something_else_leaves_a_number_that_was_refused(walker, settings, session):
+def test_undo_of_another_step_keeps_a_refused_number(walker, settings, session):
     settings.n_segments = 60
     rest(session)
     assert "takes a new Learn and Segment" in session.message
@@ -54,7 +54,7 @@ def test_undo_of_something_else_leaves_a_number_that_was_refused(walker, setting
     assert "takes a new Learn and Segment" in session.message
 
 
-def test_what_was_undone_does_not_come_back_when_a_preview_is_discarded(walker, settings, session):
+def test_discarded_preview_restores_settings_after_undo(walker, settings, session):
     bpy.ops.ed.undo_push(message="learned")
     settings.n_segments = 2
     bpy.ops.ed.undo_push(message="the slider")
@@ -67,7 +67,7 @@ def test_what_was_undone_does_not_come_back_when_a_preview_is_discarded(walker, 
     assert settings.n_segments == 4
 
 
-def test_between_two_steps_of_redo_an_update_is_offered(walker, settings, session):
+def test_update_is_offered_between_two_steps_of_redo(walker, settings, session):
     bpy.ops.ed.undo_push(message="learned")
     settings.n_segments = 2
     bpy.ops.ed.undo_push(message="the slider")
@@ -81,7 +81,7 @@ def test_between_two_steps_of_redo_an_update_is_offered(walker, settings, sessio
     assert OPS.update.poll()
 
 
-def test_after_undo_of_learning_nothing_follows(session, settings):
+def test_labels_do_not_follow_after_undo_of_learning(session, settings):
     obj = limbed_rigged()
     select(obj)
     settings.source, settings.pose_count = "FRAMES", 2
@@ -115,7 +115,7 @@ def test_adjusting_learn_does_not_learn_again(session, settings, fits, monkeypat
     assert fits == {"fit": 1, "describe": 2}
 
 
-def test_an_operator_takes_what_it_is_given_and_the_rest_from_the_scene(walker, settings):
+def test_operator_takes_given_settings_and_others_from_the_scene(walker, settings):
     settings.smoothness = 0.5
     assert OPS.learn(n_segments=3) == {"FINISHED"}
     assert settings.n_segments == 3

@@ -53,7 +53,7 @@ def test_learning_adds_a_model(poses, settings):
     assert settings.model == first
 
 
-def test_learning_may_replace_the_active_model(two):
+def test_learning_can_replace_the_active_model(two):
     two.replace_model = True
     two.active_model = 0
     two.models[0].name = "Hero"
@@ -65,7 +65,7 @@ def test_learning_may_replace_the_active_model(two):
     assert PoseSegmentation.from_json(two.model).n_segments_ == 5
 
 
-def test_a_row_that_becomes_active_is_used_with_its_names(two):
+def test_active_row_is_used_with_its_names(two):
     assert two.notes().names == {0: "Cap"}
     second = two.model
     two.active_model = 0
@@ -76,7 +76,7 @@ def test_a_row_that_becomes_active_is_used_with_its_names(two):
     assert two.notes().names == {0: "Cap"}
 
 
-def test_names_and_colors_go_with_the_model_to_another_character(two, poses):
+def test_names_and_colors_are_applied_with_the_model(two, poses):
     two.active_model = 0
     select(poses[1])
     OPS.apply()
@@ -91,14 +91,14 @@ def test_labels_stay_until_the_model_is_applied(two, poses):
     assert error_of(OPS.update), "live labels must not follow another model"
 
 
-def test_another_number_of_segments_is_the_same_model(two):
+def test_another_number_of_segments_keeps_the_row(two):
     two.n_segments = 2
     assert OPS.update() == {"FINISHED"}
     assert len(two.models) == 2
     assert two.models[1].n_segments == 2
 
 
-def test_names_are_unique(two):
+def test_model_names_are_unique(two):
     two.models[0].name = "Hero"
     two.models[1].name = "Hero"
     assert names(two) == ["Hero", "Hero 2"]
@@ -108,7 +108,7 @@ def test_names_are_unique(two):
     assert names(two) == ["Hero", "Hero 2"]
 
 
-def test_a_copy_is_another_model(two):
+def test_duplicated_model_is_independent(two):
     text = two.model
     assert OPS.duplicate_model() == {"FINISHED"}
     assert (len(two.models), two.used_model) == (3, 2)
@@ -119,7 +119,7 @@ def test_a_copy_is_another_model(two):
     assert two.notes().names == {0: "Cap"}
 
 
-def test_removing_uses_the_next_one(two):
+def test_removing_a_model_uses_the_next(two):
     first = two.models[0].model
     assert OPS.remove_model() == {"FINISHED"}
     assert (len(two.models), two.used_model, two.model) == (1, 0, first)
@@ -131,7 +131,7 @@ def test_removing_uses_the_next_one(two):
     assert not OPS.use_model.poll()
 
 
-def test_a_model_after_the_last_one_was_removed(two, poses):
+def test_learning_after_the_last_model_was_removed(two, poses):
     OPS.remove_model()
     OPS.remove_model()
     select(*poses)
@@ -139,13 +139,13 @@ def test_a_model_after_the_last_one_was_removed(two, poses):
     assert (len(two.models), two.used_model) == (1, 0)
 
 
-def test_a_name_that_is_not_in_the_list(two):
+def test_unknown_model_name_is_refused(two):
     message = error_of(OPS.use_model, name="Nobody")
     assert 'no model named "Nobody"' in message
     assert names(two)[0] in message
 
 
-def test_import_adds_and_export_writes_the_one_in_use(two, tmp_path):
+def test_import_adds_a_model_and_export_writes_the_active_one(two, tmp_path):
     path = tmp_path / "hero.json"
     two.active_model = 0
     OPS.save_model(filepath=str(path))
@@ -156,7 +156,7 @@ def test_import_adds_and_export_writes_the_one_in_use(two, tmp_path):
     assert two.notes().names == {0: "Head"}
 
 
-def test_what_the_list_does_can_be_undone(two):
+def test_changes_of_the_model_list_can_be_undone(two):
     bpy.ops.ed.undo_push(message="two")
     first, second, called = two.models[0].model, two.model, names(two)
     for change, options in ((OPS.remove_model, {}), (OPS.duplicate_model, {}), (OPS.use_model, {"name": called[0]})):
@@ -169,7 +169,7 @@ def test_what_the_list_does_can_be_undone(two):
         assert settings.notes().names == {0: "Cap"}
 
 
-def test_learning_is_undone_with_its_row(poses, settings):
+def test_undo_of_learning_removes_the_row(poses, settings):
     bpy.ops.ed.undo_push(message="before")
     OPS.learn()
     bpy.ops.ed.undo_push(message="learned")
@@ -182,7 +182,7 @@ def test_learning_is_undone_with_its_row(poses, settings):
     assert settings.model
 
 
-def test_all_models_stay_with_the_file(two, tmp_path):
+def test_all_models_are_saved_with_the_file(two, tmp_path):
     first, second, called = two.models[0].model, two.model, names(two)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -196,7 +196,7 @@ def test_all_models_stay_with_the_file(two, tmp_path):
     assert settings.notes().names == {0: "Head"}
 
 
-def test_a_model_in_no_row_is_not_lost_either(poses, settings):
+def test_model_without_a_row_is_listed(poses, settings):
     """As a script leaves it that writes the settings only."""
     OPS.learn()
     model = settings.model
@@ -207,14 +207,14 @@ def test_a_model_in_no_row_is_not_lost_either(poses, settings):
     assert settings.models[0].model == model
 
 
-def test_a_damaged_row_does_no_harm(two):
+def test_damaged_row_is_ignored(two):
     two.used_model = 7
     two.active_model = 1
     assert model_library.active_row(two) is not None
     assert two.model
 
 
-def test_details_are_short_lines(two):
+def test_details_fit_into_the_sidebar(two):
     lines = models_panel.details(two)
     assert lines[0].startswith("From Pose 0")
     assert any(two.models[1].date in line for line in lines)
@@ -226,7 +226,7 @@ def test_details_are_short_lines(two):
 # Model folder and preferences
 
 
-def test_models_of_a_folder(two, tmp_path):
+def test_models_of_the_model_folder(two, tmp_path):
     OPS.save_model(filepath=str(tmp_path / "b.json"))
     OPS.save_model(filepath=str(tmp_path / "a.json"))
     (tmp_path / "notes.txt").write_text("no model")
@@ -234,7 +234,7 @@ def test_models_of_a_folder(two, tmp_path):
     assert model_library.in_folder("") == model_library.in_folder(str(tmp_path / "missing")) == {}
 
 
-def test_preferences_are_of_the_extension():
+def test_preferences_belong_to_the_extension():
     assert WKSSegmentPreferences.bl_idname == EXTENSION == "wks_segment"
 
 
@@ -247,7 +247,7 @@ def kept():
     bpy.context.preferences.addons.remove(addon)
 
 
-def test_preferences_hold_where_there_are_some(kept, tmp_path):
+def test_preferences_are_used_when_installed(kept, tmp_path):
     kept.model_folder, kept.cache_megabytes, kept.live_seconds = str(tmp_path), 7, 0.5
     assert preference(bpy.context, "live_seconds") == 0.5
     assert model_folder(bpy.context) == str(tmp_path)
@@ -257,7 +257,7 @@ def test_preferences_hold_where_there_are_some(kept, tmp_path):
     assert session.cache.limit == 9_000_000
 
 
-def test_a_team_s_folder_is_in_the_menu(kept, tmp_path):
+def test_model_folder_is_in_the_menu(kept, tmp_path):
     (tmp_path / "horse.json").write_text("{}")
     kept.model_folder = str(tmp_path)
     menu = MagicMock()
@@ -270,7 +270,7 @@ def test_a_team_s_folder_is_in_the_menu(kept, tmp_path):
     assert "preferences" in menu.layout.label.call_args.kwargs["text"]
 
 
-def test_without_an_installed_extension_defaults_hold():
+def test_defaults_without_an_installed_extension():
     assert preference(bpy.context, "model_folder") == ""
     assert preference(bpy.context, "cache_megabytes") == 1000
     assert preference(bpy.context, "live_seconds") == 5.0

@@ -55,7 +55,7 @@ def test_ranking_changes_nothing_else(two):
     assert not changes(before, scene_snapshot())
 
 
-def test_the_best_is_applied_by_one_click(two):
+def test_best_model_is_applied_by_one_click(two):
     OPS.rank()
     select(bpy.data.objects["Box 0"])
     assert OPS.apply_ranked(index=0) == {"FINISHED"}
@@ -65,7 +65,7 @@ def test_the_best_is_applied_by_one_click(two):
     assert "Head" in two.notes().names.values()
 
 
-def test_applying_is_one_step_of_undo(two):
+def test_applying_a_ranked_model_is_one_undo_step(two):
     OPS.rank()
     bpy.ops.ed.undo_push(message="ranked")
     before = scene_snapshot()
@@ -77,7 +77,7 @@ def test_applying_is_one_step_of_undo(two):
     assert not changes(before, scene_snapshot())
 
 
-def test_what_is_gone_is_said(two):
+def test_missing_models_and_objects_are_refused(two):
     OPS.rank()
     with pytest.raises(RuntimeError, match="The ranking has only 2 models"):
         OPS.apply_ranked(index=2)
@@ -90,13 +90,13 @@ def test_what_is_gone_is_said(two):
     assert two.models[two.used_model].name == "Box"
 
 
-def test_without_a_model_or_a_ranking_the_buttons_are_gray(settings):
+def test_buttons_are_gray_without_a_model_or_a_ranking(settings):
     select(limbed())
     assert not OPS.rank.poll()
     assert not OPS.apply_ranked.poll()
 
 
-def test_an_empty_model_folder_is_told(settings, tmp_path, monkeypatch):
+def test_empty_model_folder_is_reported(settings, tmp_path, monkeypatch):
     from wks_segment.blender.operators import rank as operator
 
     for module in (model_ranking, operator):
@@ -107,7 +107,7 @@ def test_an_empty_model_folder_is_told(settings, tmp_path, monkeypatch):
         OPS.rank()
 
 
-def test_models_of_the_folder_take_part_and_are_added_when_applied(two, tmp_path, monkeypatch):
+def test_models_of_the_folder_are_ranked_and_added_when_applied(two, tmp_path, monkeypatch):
     two.active_model = 0
     OPS.save_model(filepath=str(tmp_path / "folder limbed.json"))
     (tmp_path / "broken.json").write_text("{}")
@@ -189,7 +189,7 @@ def test_rank_a_file(command, folder, tmp_path):
         (("a.obj", "--models", "."), 1, "no model in this folder that can be used"),
     ],
 )
-def test_wrong_usage_is_told(command, arguments, code, message, tmp_path, monkeypatch):
+def test_wrong_usage_is_reported(command, arguments, code, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     done = command("rank", *arguments)
     assert done.code == code
@@ -214,7 +214,7 @@ def classes(scene, tmp_path):
     return root
 
 
-def test_the_protocol_of_the_paper(command, classes, tmp_path, needs_rendering):
+def test_evaluate_runs_the_papers_retrieval(command, classes, tmp_path, needs_rendering):
     picture = tmp_path / "matrix.png"
     arguments = ("rank", "--evaluate", classes, "--learned", 3, "--frames", 5, *QUICK, "--picture", picture, "--json")
     done = command(*arguments)
@@ -233,7 +233,7 @@ def test_the_protocol_of_the_paper(command, classes, tmp_path, needs_rendering):
     assert len(np.unique(np.array(image.pixels).reshape(-1, 4)[:, :3].round(1), axis=0)) > 3
 
 
-def test_one_class_alone_is_no_protocol(command, classes):
+def test_evaluate_needs_two_classes(command, classes):
     for name in ("box", "lonely"):
         for path in (classes / name).iterdir():
             path.unlink()
@@ -243,7 +243,7 @@ def test_one_class_alone_is_no_protocol(command, classes):
     assert "there are 1 classes that can be used, and at least two are needed" in done.err
 
 
-def test_a_model_that_cannot_be_read_is_named(two):
+def test_unreadable_model_is_left_out(two):
     two.models[0].model = "{}"
     OPS.rank()
     assert [item.name for item in two.ranking] == ["Box"]

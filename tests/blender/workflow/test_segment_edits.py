@@ -34,7 +34,7 @@ pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
 
 
-def test_merged_segments_are_one_everywhere_and_stay_so(pair, settings):
+def test_merged_segments_are_one_in_all_outputs(pair, settings):
     activate(settings, 1002)
     assert OPS.merge_segments(into=1) == {"FINISHED"}
     activate(settings, 1)
@@ -54,7 +54,7 @@ def test_merged_segments_are_one_everywhere_and_stay_so(pair, settings):
         assert all_agrees(obj, settings)
 
 
-def test_only_another_segment_of_the_list_can_be_merged_with(pair, settings):
+def test_merging_needs_another_segment_of_the_list(pair, settings):
     activate(settings, 1)
     before = scene_snapshot()
     for into in (-1, 1, 7):
@@ -63,7 +63,7 @@ def test_only_another_segment_of_the_list_can_be_merged_with(pair, settings):
     assert not changes(before, scene_snapshot())
 
 
-def test_split_makes_parts_of_connected_pieces_the_same_on_all_meshes(settings):
+def test_split_numbers_regions_alike_on_all_meshes(settings):
     settings.min_share = 0.5
     objects = [limbed("First"), limbed("Second", bend=0.4), limbed("Finer", subdivisions=5)]
     select(*objects)
@@ -90,7 +90,7 @@ def test_split_makes_parts_of_connected_pieces_the_same_on_all_meshes(settings):
     assert set(labels_of(objects[0])) == {0, 3, 500}
 
 
-def test_split_leaves_crumbs_with_the_nearest_piece_and_a_single_piece_alone(settings, printed):
+def test_split_ignores_small_regions_and_refuses_a_single_one(settings, printed):
     obj = limbed()
     select(obj)
     centers = coordinates_of_faces(obj)
@@ -126,7 +126,7 @@ def test_faces_assigned_by_hand_keep_their_segment(pair, settings):
     assert settings.faces_by_hand == chosen.sum()
 
 
-def test_only_what_is_in_edit_mode_is_assigned(pair, settings):
+def test_only_objects_in_edit_mode_are_assigned(pair, settings):
     select(pair[0])
     activate(settings, 2002)
     choose(pair[0], np.arange(len(pair[0].data.polygons)) < 9)
@@ -138,7 +138,7 @@ def test_only_what_is_in_edit_mode_is_assigned(pair, settings):
     assert OPS.assign_faces() == {"CANCELLED"}
 
 
-def test_corrections_are_kept_by_apply_and_forgotten_on_request(settings):
+def test_faces_by_hand_last_until_forgotten(settings):
     objects = limbed_poses(0.0, 0.4)
     select(*objects)
     OPS.learn()
@@ -177,7 +177,7 @@ def test_new_segment_from_faces(pair, settings):
     assert all_agrees(pair[0], settings)
 
 
-def test_new_faces_of_the_artist_are_not_by_hand(pair, settings):
+def test_new_faces_are_not_by_hand(pair, settings):
     mesh = pair[0].data
     select(pair[0])
     activate(settings, 0)
@@ -187,7 +187,7 @@ def test_new_faces_of_the_artist_are_not_by_hand(pair, settings):
     assert in_object_mode(by_hand, mesh)[-1] == -1
 
 
-def test_soft_weights_follow(settings):
+def test_soft_weights_are_merged(settings):
     objects = limbed_poses(0.0, 0.4)
     select(*objects)
     settings.vertex_groups = "soft"
@@ -213,7 +213,7 @@ def weights(obj, name):
     return found
 
 
-def test_clear_removes_all_of_it(settings):
+def test_clear_removes_all_edits(settings):
     obj = limbed()
     select(obj)
     before = snapshot(obj.data)
@@ -234,7 +234,7 @@ def test_clear_removes_all_of_it(settings):
     assert not bpy.data.materials
 
 
-def test_an_attribute_of_the_artist_with_our_name_is_left_alone(settings):
+def test_users_attribute_with_our_name_is_kept(settings):
     obj = limbed()
     select(obj)
     own = obj.data.attributes.new("wks_segment_by_hand", "FLOAT", "POINT")
@@ -249,7 +249,7 @@ def test_an_attribute_of_the_artist_with_our_name_is_left_alone(settings):
     assert set(numbers(obj.data, "wks_segment_by_hand")) == {0.5}
 
 
-def test_names_colors_and_corrections_follow_a_model_that_is_learned_again(settings):
+def test_names_colors_and_faces_by_hand_are_carried_over(settings):
     obj = limbed()
     select(obj)
     labels = bands(obj)
@@ -274,7 +274,7 @@ def test_names_colors_and_corrections_follow_a_model_that_is_learned_again(setti
     np.testing.assert_array_equal(labels_of(obj)[9:], other[9:])
 
 
-def test_faces_by_hand_of_a_part_that_is_no_more_are_a_part_of_their_own(settings):
+def test_faces_by_hand_without_a_successor_become_a_part(settings):
     obj = limbed()
     select(obj)
     write(settings, obj)

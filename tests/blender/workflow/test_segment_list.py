@@ -25,7 +25,7 @@ pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
 
 
-def test_list_has_what_was_written_with_its_share_of_the_area(pair, settings):
+def test_list_shows_parts_with_shares_of_the_area(pair, settings):
     assert [item.name for item in settings.segments] == ["Segment 1", "Segment 2", "Segment 3.L", "Segment 3.R"]
     areas = {}
     for obj in pair:
@@ -37,7 +37,7 @@ def test_list_has_what_was_written_with_its_share_of_the_area(pair, settings):
     np.testing.assert_allclose(settings.segments[0].color, palette()[0], atol=1e-3)
 
 
-def test_share_is_that_of_the_selected_objects_or_of_all(pair, settings):
+def test_shares_are_of_selected_objects_or_of_all(pair, settings):
     both = [item.share for item in settings.segments]
     pair[1].scale = (3, 3, 3)
     select(pair[0])
@@ -78,7 +78,7 @@ def test_buttons_are_gray_without_segments(name):
     assert not getattr(OPS, name).poll()
 
 
-def test_a_new_name_is_written_everywhere_and_to_the_other_side(pair, settings):
+def test_new_name_is_written_everywhere_and_on_both_sides(pair, settings):
     activate(settings, 1002).name = "Hand"
     assert [item.name for item in settings.segments] == ["Segment 1", "Segment 2", "Hand.L", "Hand.R"]
     activate(settings, 2002).name = "Foot.R"
@@ -89,7 +89,7 @@ def test_a_new_name_is_written_everywhere_and_to_the_other_side(pair, settings):
     assert set(groups_of(pair[0])) == {"WKS Segment 1", "WKS Torso", "WKS Foot.L", "WKS Foot.R"}
 
 
-def test_names_are_different_and_an_empty_one_gives_back_the_number(pair, settings):
+def test_names_are_unique_and_an_empty_one_restores_the_number(pair, settings):
     activate(settings, 0).name = "Leg"
     activate(settings, 1).name = "Leg"
     assert settings.segments[1].name == "Leg 2"
@@ -103,7 +103,7 @@ def test_names_are_different_and_an_empty_one_gives_back_the_number(pair, settin
     assert PartNotes.of_json(json.loads(settings.part_notes)) == settings.notes() != PartNotes()
 
 
-def test_a_new_color_is_written_everywhere_and_only_to_that_part(pair, settings):
+def test_new_color_is_written_everywhere_for_that_part_only(pair, settings):
     before = {part: colors_at(pair[1], part) for part in (0, 1, 2002)}
     activate(settings, 1002).color = RED
     assert colors_at(pair[0], 1002) == colors_at(pair[1], 1002) == [[255, 0, 0]]
@@ -112,7 +112,7 @@ def test_a_new_color_is_written_everywhere_and_only_to_that_part(pair, settings)
     assert all(all_agrees(obj, settings) for obj in pair)
 
 
-def test_what_the_artist_changed_of_our_material_stays(pair, settings):
+def test_changes_of_our_material_by_the_user_are_kept(pair, settings):
     shader = bpy.data.materials["Segment 2"].node_tree.nodes["Principled BSDF"]
     shader.inputs["Roughness"].default_value = 0.125
     activate(settings, 1).color = RED
@@ -125,7 +125,7 @@ def test_what_the_artist_changed_of_our_material_stays(pair, settings):
     assert not bpy.data.materials["Torso"].use_fake_user
 
 
-def test_names_and_colors_hold_when_labels_are_written_again(pair, settings):
+def test_names_and_colors_last_when_labels_are_written_again(pair, settings):
     activate(settings, 1002).name = "Hand"
     activate(settings, 0).color = RED
     OPS.clear()
@@ -135,13 +135,13 @@ def test_names_and_colors_hold_when_labels_are_written_again(pair, settings):
     assert all(all_agrees(obj, settings) for obj in pair)
 
 
-def test_a_name_from_the_preset(pair, settings):
+def test_name_from_a_preset(pair, settings):
     activate(settings, 2002)
     assert OPS.name_segment(name="Forearm") == {"FINISHED"}
     assert [item.name for item in settings.segments][2:] == ["Forearm.L", "Forearm.R"]
 
 
-def test_names_and_colors_stay_with_the_blend_file_and_the_model_file(settings, tmp_path):
+def test_names_and_colors_are_saved_in_blend_and_model_files(settings, tmp_path):
     objects = limbed_poses(0.0, 0.4)
     select(*objects)
     OPS.learn()
@@ -169,7 +169,7 @@ def test_names_and_colors_stay_with_the_blend_file_and_the_model_file(settings, 
     assert colors_at(other, second) == [[255, 0, 0]]
 
 
-def test_command_line_takes_names_from_the_model(settings, command, tmp_path):
+def test_command_line_uses_names_of_the_model(settings, command, tmp_path):
     objects = limbed_poses(0.0, 0.4)
     select(*objects)
     OPS.learn()

@@ -33,7 +33,7 @@ STEPS = {
 
 
 @pytest.mark.parametrize("step", STEPS)
-def test_undo_gives_back_what_was(pair, settings, step):
+def test_undo_restores_everything(pair, settings, step):
     activate(settings, 0)
     if step in ("restore", "forget"):
         OPS.split_segment()
@@ -56,7 +56,7 @@ def test_undo_gives_back_what_was(pair, settings, step):
 
 
 @pytest.mark.parametrize("step", ["assign", "new", "forget"])
-def test_undo_in_edit_mode_gives_back_what_was(pair, settings, step):
+def test_undo_in_edit_mode_restores_everything(pair, settings, step):
     activate(settings, 0)
     if step == "forget":
         OPS.split_segment()

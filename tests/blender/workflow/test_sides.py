@@ -84,7 +84,7 @@ def sides_are_right(obj, left=1, right=2):
 # Numbers and names
 
 
-def test_parts_are_numbered_by_segment_and_side():
+def test_part_numbers_encode_segment_and_side():
     numbered = part_ids.from_segments(np.array([2, 2, 2, 0, -1]), np.array([0, 1, -1, 1, 0]))
     assert numbered.tolist() == [2, 1002, 2002, 1000, -1]
     assert part_ids.segments_of(numbered[:4]).tolist() == [2, 2, 2, 0]
@@ -93,18 +93,18 @@ def test_parts_are_numbered_by_segment_and_side():
     assert names == ["Segment 3", "Segment 3.L", "Segment 3.R", "Segment 1.L"]
 
 
-def test_blender_takes_the_names_for_those_of_sides():
+def test_blender_recognizes_side_suffixes():
     assert bpy.utils.flip_name(part_ids.default_name(1002)) == part_ids.default_name(2002)
 
 
-def test_parts_are_listed_by_segment():
+def test_parts_are_sorted_by_segment():
     assert part_ids.unique_parts(np.array([2001, 1, 2000, 5, 1001, 1])) == [2000, 1, 1001, 2001, 5]
 
 
 # Learn and Segment
 
 
-def test_left_is_where_the_left_bones_are_and_what_is_alone_has_no_side(creature):
+def test_left_matches_left_bones_and_central_parts_have_no_side(creature):
     assert OPS.learn() == {"FINISHED"}
     assert sides_are_right(creature)
     # One segment is both: feet, and the end of the tail.
@@ -112,7 +112,7 @@ def test_left_is_where_the_left_bones_are_and_what_is_alone_has_no_side(creature
     assert {feet[0]} < set(labels_of(creature))
 
 
-def test_both_sides_are_one_part_unless_asked_for(learned, settings):
+def test_both_sides_are_one_part_by_default(learned, settings):
     sided = labels_of(learned)
     settings.property_unset("sides")
     OPS.apply()
@@ -120,7 +120,7 @@ def test_both_sides_are_one_part_unless_asked_for(learned, settings):
     assert sided.max() > labels_of(learned).max() == 4
 
 
-def test_left_is_told_at_rest_however_character_and_poses_are_turned(creature):
+def test_left_is_told_at_rest_for_turned_characters(creature):
     rig = creature.parent
     rig.rotation_euler, rig.location = (0.5, 0.2, 3.0), (5, 0, 1)
     root = rig.pose.bones["pelvis"]
@@ -130,7 +130,7 @@ def test_left_is_told_at_rest_however_character_and_poses_are_turned(creature):
 
 
 @pytest.mark.parametrize(("scale", "left"), [((1, 1, 1), 1), ((-1, 1, 1), 2)])
-def test_left_is_what_is_seen_on_the_left_of_an_object_without_a_rig(creature, settings, scale, left):
+def test_left_of_an_object_without_a_rig(creature, settings, scale, left):
     statues = []
     for frame in (5, 20, 35, 50):
         bpy.context.scene.frame_set(frame)
@@ -147,7 +147,7 @@ def test_left_is_what_is_seen_on_the_left_of_an_object_without_a_rig(creature, s
     assert all(sides_are_right(statue, left, 3 - left) for statue in statues)
 
 
-def test_what_a_modifier_hides_has_the_side_of_what_is_next_to_it(creature):
+def test_masked_faces_have_the_side_of_their_neighbors(creature):
     ears = coordinates(creature.data)[:, 2] > 1.9
     creature.vertex_groups.new(name="Hidden").add(np.flatnonzero(ears).tolist(), 1.0, "REPLACE")
     mask = creature.modifiers.new("Mask", "MASK")
@@ -171,7 +171,7 @@ def test_report_counts_segments_and_parts(creature, settings, printed):
 # What has no sides
 
 
-def test_character_that_is_no_mirror_image_of_itself_has_none(settings, printed):
+def test_asymmetric_character_has_no_sides(settings, printed):
     settings.sides = "two"
     obj = limbed()
     select(obj)
@@ -181,7 +181,7 @@ def test_character_that_is_no_mirror_image_of_itself_has_none(settings, printed)
     assert labels_of(obj).max() < 4
 
 
-def test_method_of_the_paper_knows_none_and_says_so(creature, settings, printed):
+def test_paper_method_has_no_sides_and_warns(creature, settings, printed):
     settings.preset = "paper"
     printed()
     assert OPS.learn() == {"FINISHED"}
@@ -192,7 +192,7 @@ def test_method_of_the_paper_knows_none_and_says_so(creature, settings, printed)
 # Apply to Selected
 
 
-def test_sides_are_the_same_on_another_pose_and_meshing_after_a_file(learned, settings, monkeypatch, tmp_path):
+def test_loaded_model_gives_the_same_sides_on_another_pose_and_meshing(learned, settings, monkeypatch, tmp_path):
     path = tmp_path / "model.json"
     OPS.save_model(filepath=str(path))
     settings.model = ""
@@ -221,7 +221,7 @@ def test_colors_of_left_and_right_are_written(learned):
     assert len(np.unique(corners, axis=0)) == 10
 
 
-def test_materials_of_a_segment_stand_together_and_meshes_share_them():
+def test_materials_are_sorted_by_segment_and_shared():
     meshes = [limbed(name).data for name in ("First", "Second")]
     labels = np.resize([2001, 1, 0, 1001, 7], len(meshes[0].polygons))
     before = snapshot(meshes[0])
@@ -241,7 +241,7 @@ def test_materials_of_a_segment_stand_together_and_meshes_share_them():
     assert not len(bpy.data.materials)
 
 
-def test_vertices_get_the_part_of_most_faces_around_them():
+def test_vertices_get_the_part_of_most_adjacent_faces():
     mesh = limbed().data
     height = np.array([polygon.center.z for polygon in mesh.polygons])
     write_labels(mesh, np.where(height > 0.3, 2003, np.where(height > -0.3, 1003, 3)))
@@ -251,7 +251,7 @@ def test_vertices_get_the_part_of_most_faces_around_them():
     assert (found[z < -0.6] == 3).all()
 
 
-def test_hard_groups_are_of_one_side(learned, settings):
+def test_hard_groups_have_one_side(learned, settings):
     settings.vertex_groups = "hard"
     OPS.apply()
     groups, labels = ours(learned), labels_of(learned)
@@ -265,7 +265,7 @@ def test_hard_groups_are_of_one_side(learned, settings):
         np.testing.assert_array_equal(members, np.unique(np.concatenate(corners)))
 
 
-def test_soft_weights_of_a_segment_are_those_of_its_parts(learned, settings):
+def test_soft_weights_of_parts_sum_to_those_of_the_segment(learned, settings):
     settings.vertex_groups = "soft"
     OPS.apply()
     two = ours(learned)
@@ -289,7 +289,7 @@ def test_soft_weights_of_a_segment_are_those_of_its_parts(learned, settings):
 
 
 @pytest.mark.parametrize("groups", ["hard", "soft"])
-def test_clear_gives_back_what_was(learned, settings, groups):
+def test_clear_restores_everything(learned, settings, groups):
     OPS.clear()
     before, own = scene_snapshot(), weights_of(learned)
     settings.write_materials, settings.vertex_groups = True, groups
@@ -301,7 +301,7 @@ def test_clear_gives_back_what_was(learned, settings, groups):
     np.testing.assert_array_equal(list(weights_of(learned).values()), list(own.values()))
 
 
-def test_undo_gives_back_what_was(learned):
+def test_undo_restores_everything(learned):
     OPS.clear()
     bpy.ops.ed.undo_push(message="before")
     before = snapshot(bpy.data.meshes["Creature"])
@@ -316,7 +316,7 @@ def test_undo_gives_back_what_was(learned):
     assert written.max() > 2000
 
 
-def test_demo_measures_sides_as_well(creature, settings, tmp_path, needs_rendering):
+def test_demo_measures_sides(creature, settings, tmp_path, needs_rendering):
     character = Character((creature,))
     result = demo_scene.run(bpy.context, character, settings, tmp_path / "walk", 4, 1, lambda stage, share: None)
     assert (result["segments"], len(result["parts"])) == (5, len(np.unique(labels_of(creature))))
@@ -324,7 +324,7 @@ def test_demo_measures_sides_as_well(creature, settings, tmp_path, needs_renderi
     assert sides_are_right(creature)
 
 
-def test_agreement_counts_what_changes_sides():
+def test_agreement_counts_swapped_sides_as_wrong():
     labels = [np.array([0, 1002, 2002])] * 2 + [np.array([0, 2002, 2002])]
     assert demo_scene.agreements(labels, [True, True, False], [np.array([1.0, 1.0, 2.0])] * 3) == [1.0, 1.0, 0.75]
 
@@ -345,7 +345,7 @@ def opened(path):
     return bpy.data.objects["Creature"]
 
 
-def test_segment_and_apply_tell_left_from_right(command, file, tmp_path):
+def test_segment_and_apply_commands_write_sides(command, file, tmp_path):
     output, model = tmp_path / "out.blend", tmp_path / "model.json"
     segment = ("segment", file, "--frames", 4, *QUICK, "--model", model, "--output", output)
     done = command(*segment, "--sides", "two", "--materials", "--json")
@@ -366,7 +366,7 @@ def test_segment_and_apply_tell_left_from_right(command, file, tmp_path):
     assert list(done.result["parts"].values()) == [0, 1, 2, 3, 4], "the file's own setting was taken"
 
 
-def test_the_method_of_the_paper_is_warned_of(command, file, tmp_path):
+def test_command_warns_of_the_paper_method(command, file, tmp_path):
     options = ("--preset", "paper", "--sides", "two", "--output", tmp_path / "out.blend", "--json")
     done = command("segment", file, "--frames", 4, *QUICK, *options)
     assert done.code == 0, done
@@ -374,7 +374,7 @@ def test_the_method_of_the_paper_is_warned_of(command, file, tmp_path):
     assert len(done.result["parts"]) == done.result["segments"]
 
 
-def test_wrong_use_of_the_option(command, file, tmp_path):
+def test_wrong_value_of_the_sides_option(command, file, tmp_path):
     done = command("segment", file, "--output", tmp_path / "out.blend", "--sides", "three")
     assert done.code == 2
     assert "--sides" in done.err

@@ -60,7 +60,7 @@ class Run:
     cache : optional
         Signatures computed earlier; new ones are added.
     workers : int, optional
-        Processes that describe poses, see `PoseSegmentation.describe_all`.
+        Threads that describe poses at the same time, see `PoseSegmentation.describe_all`.
     """
 
     report: Report
