@@ -224,7 +224,7 @@ def test_paper_method_keeps_its_number_of_segments(session, settings):
     settings.n_segments = 3
     rest(session)
     np.testing.assert_array_equal(labels_of(obj), before)
-    assert "takes a new Learn and Segment" in session.message
+    assert "needs a new Learn and Segment" in session.message
 
 
 def test_large_job_is_not_kept(session, settings, monkeypatch):

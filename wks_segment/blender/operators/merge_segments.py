@@ -43,7 +43,7 @@ class WKS_SEGMENT_OT_merge_segments(BaseOperator, bpy.types.Operator):
         settings = context.scene.wks_segment
         part, into = segment_list.active_part(settings), self.into
         if part is None or into == part or into not in [item.number for item in settings.segments]:
-            raise UserError("Choose another segment of the list to merge the active one with")
+            raise UserError("Choose another segment to merge the active one into")
         notes, style = settings.notes(), settings.style()
         joined = {other: into if old == part else old for other, old in notes.joined.items()}
         settings.keep_notes(replace(notes, joined=joined | {part: into}))

@@ -13,7 +13,7 @@ from ..workflow import segment_list
 from . import _needs, _report
 from ._base import BaseOperator
 
-AS_THE_MODEL = "The segments are those of the model"
+AS_THE_MODEL = "The segments are as in the model"
 """What Restore says, whether it has done something or there was nothing to do."""
 
 

@@ -22,14 +22,14 @@ def _labeled_active_object(context: bpy.types.Context) -> Message | None:
     active = context.active_object
     if active is not None and active.type == "MESH" and labels_on(active.data) is not None:
         return None
-    return Message("The active object, the one that was clicked last, has no segments")
+    return Message("The active object has no segments: click an object that has segments last")
 
 
 def _other_selected_mesh(context: bpy.types.Context) -> Message | None:
     """A selected mesh object beside the active one."""
     if set(mesh_objects(context.selected_objects)) - {context.active_object}:
         return None
-    return Message("Select the objects that are to get segments, and last the one that has them")
+    return Message("Select the target objects first, and last the object that has segments")
 
 
 class WKS_SEGMENT_OT_transfer(BaseOperator, bpy.types.Operator):

@@ -68,7 +68,7 @@ def corrected_parts(character: Character, source: str) -> dict[Hashable, int]:
                 part = next(free, None)
                 if part is None:
                     raise UserError(
-                        '"{name}" has more than {count} of them: too many for segments',
+                        '"{name}" has too many of these for segments, more than {count}',
                         name=character.name,
                         count=SIDE_STEP,
                     )
@@ -104,7 +104,7 @@ def _in_face_sets(obj: bpy.types.Object) -> _Membership:
     numbers = read_attribute(obj.data, FACE_SET_ATTRIBUTE)
     if numbers is None:
         raise UserError(
-            '"{name}" has no face sets: draw some in Sculpt Mode, or write those of segments', name=obj.name
+            '"{name}" has no face sets: draw some in Sculpt Mode, or let segments write theirs', name=obj.name
         )
     keys, index = np.unique(numbers, return_inverse=True)
     ours = [int(number) for number in Ledger(obj.data).get("face_sets", [])]
@@ -114,7 +114,7 @@ def _in_face_sets(obj: bpy.types.Object) -> _Membership:
 def _in_materials(obj: bpy.types.Object) -> _Membership:
     materials = [slot.material for slot in obj.material_slots]
     if not materials:
-        raise UserError('"{name}" has no materials: assign some, or write those of segments', name=obj.name)
+        raise UserError('"{name}" has no materials: assign some, or let segments write theirs', name=obj.name)
     slots = read_ints(obj.data.polygons, "material_index")
     ours = {material: int(material[PART_PROPERTY]) for material in materials if material and PART_PROPERTY in material}
     # Blender shows the last material on faces with an index beyond the last slot.
@@ -125,7 +125,7 @@ def _in_groups(obj: bpy.types.Object) -> _Membership:
     weights, ours = group_weights(obj.data), our_groups(obj.data)
     names = [name for name in weights if not ours or name not in own_groups(obj.data)]
     if not names:
-        raise UserError('"{name}" has no vertex groups: add some, or write those of segments', name=obj.name)
+        raise UserError('"{name}" has no vertex groups: add some, or let segments write theirs', name=obj.name)
     vertices, starts = read_ints(obj.data.loops, "vertex_index"), read_ints(obj.data.polygons, "loop_start")
     sums = np.add.reduceat(np.stack([weights[name] for name in names], axis=1)[vertices], starts, axis=0)
     # Faces in no group are one more part.

@@ -68,7 +68,7 @@ class Character:
         found = {member.name: member.found() for member in self.members}
         missing = [name for name, obj in found.items() if obj is None]
         if missing:
-            raise UserError("{names} is gone", names=quoted(missing))
+            raise UserError("{names} does not exist any more", names=quoted(missing))
         return tuple(found.values())
 
     @property

@@ -63,9 +63,7 @@ class _Sidebar:
             return
         slow = session.is_slow
         if settings.live and slow:
-            text = Message(
-                "Labels take {seconds:.0f} seconds here, too long to follow by themselves", seconds=session.seconds
-            )
+            text = Message("Labels take {seconds:.0f} seconds here, too long to update live", seconds=session.seconds)
             for line in wrapped(text):
                 column.label(text=line)
         for line in wrapped(session.message):

@@ -233,7 +233,7 @@ class Session:
         except ChangedError as error:
             self.drop()
             raise UserError(
-                "Segments do not follow any more, learn or apply again: {reason}", reason=message_of(error)
+                "Segments are not updated any more, learn or apply again: {reason}", reason=message_of(error)
             ) from error
 
     def _state(self, scene: bpy.types.Scene) -> str:

@@ -136,7 +136,7 @@ class SegmentationJob:
                     model = model.with_segments(number, described, first.poses[0].upright)
             except ValueError as error:
                 raise UserError(
-                    "This number of segments takes a new Learn and Segment: {reason}", reason=message_of(error)
+                    "This number of segments needs a new Learn and Segment: {reason}", reason=message_of(error)
                 ) from error
         with report.stage("read"):
             request = LabelRequest.of(settings, [pose.character for pose in first.poses])

@@ -104,7 +104,7 @@ def cut_borders(
         If a weight is negative or not a number.
     """
     if not (weights >= 0).all():
-        raise ValueError("a weight of a border must not be negative")
+        raise ValueError("the weights of borders must not be negative")
     areas, adjacency = graph.areas, graph.adjacency
     labels = np.asarray(posteriors.argmax(axis=1) if labels is None else labels)
     unit = np.sqrt(areas.sum())
