@@ -1,3 +1,3 @@
-"""The extension's door: Blender enables this folder, the package inside does the work."""
+"""Entry of the extension: Blender imports this folder, and the code is in the package inside."""
 
 from .wks_segment.blender import register, unregister  # noqa: F401

@@ -1,1 +1,1 @@
-"""Measurements, each a command that prints a table."""
+"""Measurements. Each command prints a table; `python -m benchmarks.NAME --help` says what it measures."""

@@ -1,8 +1,8 @@
-"""How far the fast solver is from the exact one on meshes of your own: `python -m benchmarks.accuracy PATH...`.
+"""Accuracy of the fast eigensolver on given meshes, compared with the exact one: `python -m benchmarks.accuracy PATH…`.
 
-PATH is an .npz file with `vertices` and `faces`, or a folder of them; each is welded and refined as the extension does
-it. Prints a Markdown table, the worst last, and a summary: error of the signature, agreement of the labels that one
-mixture, fitted on the exact signature, gives to both (adjusted Rand index), and CPU seconds on one BLAS thread.
+PATH is an .npz file with `vertices` and `faces`, or a folder of such files. Each mesh is welded and refined as in the
+extension. Prints a Markdown table with the worst mesh last, and a summary: error of the signature, agreement of labels
+(adjusted Rand index, with one mixture that is fitted to the exact signature), and CPU seconds on one BLAS thread.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from wks_segment.core import TriangleMesh, eigenpairs, prepare_surface, wave_ker
 from wks_segment.core.poses.describe import VERTICES_PER_PAIR
 from wks_segment.core.spectral.signature import wave_kernel_signature_of
 
-LIMIT = 0.7
-"""Error of the signature, in percent, that counts as too large."""
+LARGE_ERROR = 0.7
+"""Error of the signature, in percent, above which a mesh is counted in the summary."""
 
 
 def main() -> None:
-    """Compare on all meshes and print."""
+    """Compare the solvers on all meshes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("paths", type=Path, nargs="+", metavar="PATH")
     options = parser.parse_args()
     files = mesh_files(options.paths)
     if not files:
-        parser.error("no .npz file there")
+        parser.error("there is no .npz file")
     rows = []
     for path in files:
         with np.load(path) as arrays:
@@ -47,19 +47,19 @@ def main() -> None:
     errors, indices = np.array([row[2] for row in rows]), np.array([row[3] for row in rows])
     print(
         f"\n{len(rows)} meshes: WKS error {errors.mean():.2f} % on average, {errors.max():.2f} % at most, "
-        f"{np.count_nonzero(errors > LIMIT)} over {LIMIT} %; index {indices.mean():.4f} on average, "
+        f"{np.count_nonzero(errors > LARGE_ERROR)} over {LARGE_ERROR} %; index {indices.mean():.4f} on average, "
         f"{indices.min():.4f} at least"
     )
 
 
 def mesh_files(paths: Sequence[Path]) -> list[Path]:
-    """The files given, and those in the folders given."""
+    """The given files, and all .npz files in the given folders."""
     return [file for path in paths for file in (sorted(path.glob("*.npz")) if path.is_dir() else [path])]
 
 
 @threadpool_limits.wrap(limits=1)
 def compare(mesh: TriangleMesh) -> tuple[int, float, float, float, float]:
-    """Vertices, error in percent, adjusted Rand index, and CPU seconds of both."""
+    """Number of vertices, error in percent, adjusted Rand index, CPU seconds of the fast and of the exact solver."""
     mesh = prepare_surface(mesh, VERTICES_PER_PAIR * N_PAIRS).mesh
     n_pairs = N_PAIRS + int(mesh.components.max())
     start = time.process_time()

@@ -1,4 +1,4 @@
-"""How far labels agree: with those of the poses that were learned, with people's, with each other."""
+"""Measures of agreement of labels: with the learned poses, with segmentations by people, and with each other."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from wks_segment.core.mesh.triangle_mesh import IntArray
 
 
 @dataclass(frozen=True)
-class WithLearned:
-    """Labels of poses with the same faces, some of them learned.
+class AgreementWithLearned:
+    """Agreement of labels in unseen poses with those in the learned poses of the same mesh.
 
     Attributes
     ----------
     known : (m,) int array
-        The label that the learned poses give each face.
+        Label of each face by all learned poses together.
     labels : dict
-        Name of each other pose to the labels of its faces.
+        Name of each unseen pose to the labels of its faces.
     shares : list of float
-        The share of each other pose's area that has the known label.
+        For each unseen pose the share of its area with the known label.
     """
 
     known: IntArray
@@ -35,17 +35,17 @@ class WithLearned:
 
 
 @dataclass(frozen=True)
-class WithPeople:
-    """Shapes of a class that were not learned.
+class AgreementWithPeople:
+    """Agreement of labels of unseen shapes of a class with segmentations and part names by people.
 
     Attributes
     ----------
     regions : dict
-        Name of each shape to its connected parts.
+        Name of each shape to the region of each of its faces.
     errors : list of float
-        The Rand-index error of these against people's: of each shape the mean over people.
+        Rand-index error of the regions of each shape, averaged over the segmentations by people.
     named : list of float
-        The adjusted Rand index between components and part names, of each shape whose parts have names.
+        Adjusted Rand index between segments and part names, for each shape that has part names.
     """
 
     regions: dict[str, IntArray]
@@ -53,8 +53,10 @@ class WithPeople:
     named: list[float]
 
 
-def with_learned(model: PoseSegmentation, poses: Mapping[str, PoseSignature], learned: Sequence[str]) -> WithLearned:
-    """Learn some of the poses, which all have the same faces, and find their labels in the others."""
+def with_learned(
+    model: PoseSegmentation, poses: Mapping[str, PoseSignature], learned: Sequence[str]
+) -> AgreementWithLearned:
+    """Fit a model to some poses of a mesh and label the others."""
     chosen = [poses[name] for name in learned]
     faces = np.arange(chosen[0].surface.original.n_faces)
     known = model.fit(chosen).segment_polygons(chosen, [faces] * len(chosen))
@@ -63,41 +65,41 @@ def with_learned(model: PoseSegmentation, poses: Mapping[str, PoseSignature], le
         float(np.average(of_pose == known, weights=poses[name].surface.original.face_areas))
         for name, of_pose in labels.items()
     ]
-    return WithLearned(known, labels, shares)
+    return AgreementWithLearned(known, labels, shares)
 
 
 def with_people(
     model: PoseSegmentation, shapes: Mapping[str, PoseSignature], learned: Sequence[str], truth: Mapping[str, Any]
-) -> WithPeople:
-    """Learn some of the shapes and compare the others with "human_segmentations" and "part_names" of each."""
+) -> AgreementWithPeople:
+    """Fit a model to some shapes and compare the others with their "human_segmentations" and "part_names"."""
     model.fit([shapes[name] for name in learned])
     others = {name: shape for name, shape in shapes.items() if name not in learned}
     regions = {name: model.segment_regions(shape) for name, shape in others.items()}
     errors = [
-        float(np.mean([rand_index_error(of_shape, one) for one in truth[name]["human_segmentations"]]))
-        for name, of_shape in regions.items()
+        float(np.mean([rand_index_error(labels, person) for person in truth[name]["human_segmentations"]]))
+        for name, labels in regions.items()
     ]
     named = [
         float(adjusted_rand_score(truth[name]["part_names"], model.segment_faces(shape)))
         for name, shape in others.items()
         if "part_names" in truth[name]
     ]
-    return WithPeople(regions, errors, named)
+    return AgreementWithPeople(regions, errors, named)
 
 
 def of_pairs(labels: Sequence[IntArray]) -> list[float]:
-    """Adjusted Rand index of each two of some labelings."""
+    """Adjusted Rand index of each pair of labelings."""
     return [float(adjusted_rand_score(a, b)) for a, b in combinations(labels, 2)]
 
 
 def of_people(segmentations: Sequence[Any]) -> float:
-    """Rand-index error of people against each other, the mean of all pairs; 0 for one."""
-    each = [np.unique(one, return_inverse=True)[1].ravel() for one in segmentations]
-    return float(np.mean([rand_index_error(a, b) for a, b in combinations(each, 2)] or [0.0]))
+    """Rand-index error between segmentations by different people, averaged over all pairs; 0 if there is only one."""
+    labelings = [np.unique(segmentation, return_inverse=True)[1].ravel() for segmentation in segmentations]
+    return float(np.mean([rand_index_error(a, b) for a, b in combinations(labelings, 2)] or [0.0]))
 
 
 def rand_index_error(labels: IntArray, others: Any) -> float:
-    """Share of the pairs of faces that one segmentation puts together and the other apart."""
+    """Share of pairs of faces that are in one segment in one of the segmentations and in two in the other."""
     n = len(labels)
     table = coo_matrix((np.ones(n), (labels, np.unique(others, return_inverse=True)[1].ravel()))).toarray()
     together = (table.sum(axis=1) ** 2).sum() + (table.sum(axis=0) ** 2).sum()

@@ -1,10 +1,10 @@
-"""Whole batches: `python -m benchmarks.batches CHARACTERS [--files 200] [--output demo/batches] [--runs NAME,…]`.
+"""Throughput of batches: `python -m benchmarks.batches CHARACTERS [--files 200] [--runs NAME,…]`.
 
-Writes frames of the characters as files, one of which is broken and one of which hangs Blender's importer for ever (its
-materials are a pipe that nobody writes to), and learns a model of each: with one process, with two, with two Dask
-workers, with two Dask workers of which one is killed, and with two processes that are killed and resumed. Prints a
-Markdown table of seconds, throughput and results; models must be the same byte for byte. Then what another number of
-segments takes with a cache, beside the first. Needs Linux or macOS.
+Writes frames of the characters as files, one of which is broken and one of which makes Blender's importer hang forever
+(its materials are a pipe to which nobody writes), and learns a model from each: with one process, with two, with two
+Dask workers, with two Dask workers of which one is killed, and with two processes that are killed and resumed. Prints a
+Markdown table of seconds, throughput and results; the models of all runs must have the same bytes. Then it measures how
+long another number of segments takes with a cache. Needs Linux or macOS.
 """
 
 from __future__ import annotations
@@ -26,10 +26,12 @@ from benchmarks.speed import table_row
 
 SETTINGS = ("--segments", "6", "--no-thumbnails")
 TIME_LIMIT = 60
-"""Seconds for a file: the one that hangs takes all of them."""
-BROKEN, HANGS, PIPE = "broken.glb", "0_hangs.obj", "nobody_writes"
-"""What hangs comes first, so that nothing waits for it in the end."""
-CACHED_FRAMES, FIRST, SECOND = 5, "8", "6"
+"""Time limit of a file in seconds; the file that hangs takes all of it."""
+BROKEN_FILE, HANGING_FILE, PIPE = "broken.glb", "0_hangs.obj", "nobody_writes"
+"""The file that hangs is the first by name, so that no run waits for it at the end."""
+CACHED_FRAMES = 5
+FIRST_SEGMENTS, OTHER_SEGMENTS = 8, 6
+"""Number of segments of the first fit, and of the one that uses its cache."""
 WRITE_FRAMES = """
 import os, random, sys
 import bpy
@@ -55,10 +57,10 @@ os._exit(0)
 
 
 def main() -> None:
-    """Run them."""
+    """Run all that the options ask for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("characters", type=Path, help="a folder of .glb files")
-    parser.add_argument("--files", type=int, default=200)
+    parser.add_argument("--files", type=int, default=200, help="number of files to write")
     parser.add_argument("--output", type=Path, default=Path("demo/batches"))
     parser.add_argument("--runs", default=",".join([*RUNS, "cached"]))
     options = parser.parse_args()
@@ -93,36 +95,36 @@ def main() -> None:
 
 
 def write_inputs(characters: list[Path], folder: Path, count: int) -> None:
-    """Frames of the characters, about as many of each, and the two that go wrong."""
+    """Write frames of the characters, about as many of each, and the two files that fail."""
     folder.mkdir()
     for i, path in enumerate(characters):
         frames = len(range(i, count - 2, len(characters)))
         if frames:
             command = [sys.executable, "-c", WRITE_FRAMES, str(path), str(folder / path.stem), str(frames)]
             subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=600)
-    (folder / BROKEN).write_bytes(characters[0].read_bytes()[:20_000])
+    (folder / BROKEN_FILE).write_bytes(characters[0].read_bytes()[:20_000])
     os.mkfifo(folder / PIPE)
-    (folder / HANGS).write_text(f"mtllib {PIPE}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    (folder / HANGING_FILE).write_text(f"mtllib {PIPE}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
 
 
 def one(inputs: Path, out: Path) -> dict[str, Any]:
-    """One process."""
+    """A batch with one process."""
     return _finished(_batch(inputs, out, "--processes", "1"))
 
 
 def two(inputs: Path, out: Path) -> dict[str, Any]:
-    """Two processes."""
+    """A batch with two processes."""
     return _finished(_batch(inputs, out, "--processes", "2"))
 
 
 def dask(inputs: Path, out: Path) -> dict[str, Any]:
-    """Two Dask workers."""
+    """A batch with two Dask workers."""
     with _cluster() as (address, _):
         return _finished(_batch(inputs, out, "--scheduler", address))
 
 
 def killed_worker(inputs: Path, out: Path) -> dict[str, Any]:
-    """Two Dask workers, one of which is killed when a third of the files are done."""
+    """A batch with two Dask workers, one of which is killed when a third of the files are done."""
     with _cluster() as (address, workers):
         process = _batch(inputs, out, "--scheduler", address)
         _wait_for(out, len(list(inputs.iterdir())) // 3, process)
@@ -131,7 +133,7 @@ def killed_worker(inputs: Path, out: Path) -> dict[str, Any]:
 
 
 def resumed(inputs: Path, out: Path) -> dict[str, Any]:
-    """Two processes, killed when half of the files are done, and the same command with --resume."""
+    """A batch with two processes that is killed when half of the files are done, and then resumed."""
     process = _batch(inputs, out, "--processes", "2")
     _wait_for(out, len(list(inputs.iterdir())) // 2, process)
     process.kill()
@@ -149,11 +151,11 @@ NAMES = {"one": "1 process", "two": "2 processes", "dask": "2 Dask workers", "ki
 
 
 def cached(characters: list[Path], output: Path) -> None:
-    """What `learn` takes for another number of segments, with the signatures and mixtures of the first in a cache."""
+    """Print the seconds for another number of segments, with signatures and mixtures of the first fit in a cache."""
     import bpy
 
     import wks_segment.blender
-    from wks_segment.blender.cli.commands.common import characters_in
+    from wks_segment.blender.cli.reading import characters_in
     from wks_segment.blender.cli.terminal import only_result_on_stdout
     from wks_segment.blender.scene.characters import mesh_objects
     from wks_segment.blender.scene.file_formats import open_files
@@ -164,7 +166,8 @@ def cached(characters: list[Path], output: Path) -> None:
     from wks_segment.core import DiskCache, PoseSegmentation
 
     wks_segment.blender.register()
-    print(f"\n| {CACHED_FRAMES} poses | {FIRST} segments, s | {SECOND} from the cache, s | share |\n|{'---|' * 4}")
+    header = [f"{CACHED_FRAMES} poses", f"{FIRST_SEGMENTS} segments, s", f"{OTHER_SEGMENTS} with cache, s", "share"]
+    print(f"\n{table_row(header)}\n{table_row(['---'] * 4)}")
     shares = []
     cache = DiskCache(output / "cache")
     for path in characters:
@@ -173,11 +176,12 @@ def cached(characters: list[Path], output: Path) -> None:
             if not mesh_objects(objects):
                 continue
             (character,) = characters_in(path, objects, None)
-            poses = read_frames(bpy.context, character, own_frames(bpy.context.scene, character, CACHED_FRAMES))
+            frames = own_frames(bpy.context.scene, character, CACHED_FRAMES)
+            poses = read_frames(bpy.context, character, frames)
         seconds = []
-        for number in (FIRST, SECOND):
+        for number in (FIRST_SEGMENTS, OTHER_SEGMENTS):
             begun = time.monotonic()
-            model = PoseSegmentation(n_segments=int(number))
+            model = PoseSegmentation(n_segments=number)
             pipeline.learn(model, poses, Run(Report([]), cache=cache))
             seconds.append(time.monotonic() - begun)
         shares.append(seconds[1] / seconds[0])
@@ -204,14 +208,14 @@ def _lines(out: Path) -> int:
 
 
 def _wait_for(out: Path, count: int, process: subprocess.Popen[str]) -> None:
-    """Until so many files are in the list."""
+    """Wait until the log has a number of lines."""
     while _lines(out) < count and process.poll() is None:
         time.sleep(0.1)
 
 
 @contextmanager
 def _cluster() -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
-    """The address of a scheduler on this machine, and its two workers; all of it gone afterwards."""
+    """A scheduler on this machine and two workers, which are ended afterwards; its address, and the workers."""
     processes: list[subprocess.Popen[str]] = []
 
     def start(*arguments: str, until: str) -> str:
@@ -221,8 +225,8 @@ def _cluster() -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
         stream: IO[str] | None = process.stderr
         assert stream is not None
         for line in stream:
-            if found := re.search(until, line):
-                return found[0]
+            if match := re.search(until, line):
+                return match[0]
         raise RuntimeError(f"{command}: ended with {process.wait()}")
 
     try:

@@ -1,4 +1,4 @@
-"""Other people than MakeHuman's: its body with longer or shorter bones and more or less flesh on them."""
+"""Bodies of other proportions: that of MakeHuman with longer or shorter bones and more or less flesh on them."""
 
 from __future__ import annotations
 
@@ -7,24 +7,27 @@ import numpy as np
 from benchmarks.makehuman import MakeHuman
 from wks_segment.core.mesh.triangle_mesh import FloatArray
 
-MOST = 1.2
-"""How many times as long or thick as MakeHuman's a part can be, or the other way round."""
-SHARED = 0.5
-"""How much of this is in common to a whole body: tall people have long arms and legs, stout ones are so everywhere."""
+MAX_SCALE = 1.2
+"""Largest factor between the length or girth of a body part and that of MakeHuman's body, in either direction."""
+SHARED_VARIATION = 0.5
+"""Share of the variation that is common to the whole body: tall people have long arms and legs."""
 SCALED = (
     "root", "spine02", "neck01", "head", "pelvis", "upperleg", "lowerleg", "foot", "clavicle", "upperarm", "lowerarm",
     "wrist",
 )  # fmt: skip
-"""Parts with a scale of their own, by the beginnings of their bones' names; other bones have that of their parent."""
+"""Bones with a scale of their own, by the beginning of their names; other bones have the scale of their parent."""
 UPRIGHT = ("root", "spine02", "neck01", "head")
-"""Parts whose length is their height; that of others is along the bone."""
+"""Bones whose length is measured along the vertical axis, and not along the bone."""
 
 
 def other_body(body: MakeHuman, seed: int) -> MakeHuman:
-    """The body of somebody else, drawn by a seed: bones and the flesh on them scaled, both sides alike."""
+    """A body with randomly scaled bones, the same on both sides."""
     generator = np.random.default_rng(seed)
     whole = generator.uniform(-1, 1, 2)
-    length_and_girth = {part: MOST ** (SHARED * whole + (1 - SHARED) * generator.uniform(-1, 1, 2)) for part in SCALED}
+    length_and_girth = {}
+    for bone in SCALED:
+        own = generator.uniform(-1, 1, 2)
+        length_and_girth[bone] = MAX_SCALE ** (SHARED_VARIATION * whole + (1 - SHARED_VARIATION) * own)
     scales = {}
     for name in body.bones:
         part = next((part for part in SCALED if name.startswith(part)), None)
@@ -36,7 +39,7 @@ def other_body(body: MakeHuman, seed: int) -> MakeHuman:
 
 
 def _direction(body: MakeHuman, name: str) -> FloatArray:
-    """Where a bone points: from its head to those of the bones on it."""
+    """Unit vector from the head of a bone to the mean of the heads of its children."""
     ends = [head for parent, head in body.bones.values() if parent == name]
     along = np.mean(ends, axis=0) - body.bones[name][1]
     return np.asarray(along / np.linalg.norm(along))

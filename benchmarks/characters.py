@@ -1,7 +1,7 @@
-"""Real characters through the whole extension: `python -m benchmarks.characters FOLDER [--output FOLDER]`.
+"""Consistency of labels on real characters: `python -m benchmarks.characters FOLDER [--output FOLDER]`.
 
-Each file is imported by Blender; 5 poses are learned from, 3 others are only labeled. Prints a Markdown table and
-writes a contact sheet. Rigged files without an animation are posed by turning their bones at random.
+Runs `wks_segment demo` on each file of the folder: 5 poses are learned, 3 others are only labeled. Prints a Markdown
+table and writes a contact sheet. A rigged file without an animation gets poses with randomly rotated bones.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ LEARNED, UNSEEN = 5, 3
 FILES = (".glb", ".gltf", ".fbx", ".blend")
 SHEET_WIDTH = 1600
 
-POSE_AT_RANDOM = """
+ADD_RANDOM_POSES = """
 import os, random, sys
 import bpy
 source, target, count = sys.argv[1], sys.argv[2], int(sys.argv[3])
@@ -43,7 +43,7 @@ os._exit(0)
 
 
 def main() -> int:
-    """Run all files of a folder; 1 if one of them failed."""
+    """Measure all files of a folder; return 1 if one of them failed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--output", type=Path, default=Path("demo/characters"))
@@ -54,7 +54,7 @@ def main() -> int:
     options.output.mkdir(parents=True, exist_ok=True)
     paths = sorted(path for path in options.folder.iterdir() if path.suffix in FILES)
     if not paths:
-        parser.error(f"{options.folder}: no {', '.join(FILES)} in it")
+        parser.error(f"{options.folder}: there is no file of type {', '.join(FILES)} in it")
     print(
         f"| character | vertices | CPU s a pose | agreement learned | agreement unseen | worst unseen |\n|{'---|' * 6}"
     )
@@ -69,7 +69,7 @@ def main() -> int:
 
 
 def measure(path: Path, output: Path, settings: list[str]) -> dict[str, Any]:
-    """Run the demo on one file and print its row."""
+    """Run the demo on one file, and print its row of the table."""
     source = posed(path, output)
     command = [sys.executable, "-m", "wks_segment", "demo", "--json", "--input", str(source), "--folder", str(output)]
     command += [*settings, "--learn", str(LEARNED), "--unseen", str(UNSEEN)]
@@ -82,10 +82,10 @@ def measure(path: Path, output: Path, settings: list[str]) -> dict[str, Any]:
         [pose["agreement"] for pose in result["poses"] if pose["learned"] is known] for known in (True, False)
     )
     row = {"learned": np.mean(learned), "unseen": np.mean(unseen), "worst": min(unseen)}
-    note = "" if source == path else " (bones turned at random)"
-    each = result["seconds"]["signature"] / len(result["poses"])
+    note = "" if source == path else " (bones rotated at random)"
+    seconds = result["seconds"]["signature"] / len(result["poses"])
     print(
-        f"| {path.stem}{note} | {result['poses'][0]['vertices']:,} | {each:.1f} "
+        f"| {path.stem}{note} | {result['poses'][0]['vertices']:,} | {seconds:.1f} "
         f"| {row['learned']:.3f} | {row['unseen']:.3f} | {row['worst']:.3f} |",
         flush=True,
     )
@@ -93,23 +93,23 @@ def measure(path: Path, output: Path, settings: list[str]) -> dict[str, Any]:
 
 
 def posed(path: Path, output: Path) -> Path:
-    """The file itself, or a copy with made-up poses where it has a rig but no animation."""
+    """The file itself, or a copy with random poses if it has a rig but no animation."""
     if path.suffix not in (".glb", ".gltf"):
         return path
     target = output / f"{path.stem}.posed" / f"{path.stem}.blend"
     target.parent.mkdir(exist_ok=True)
-    command = [sys.executable, "-c", POSE_AT_RANDOM, str(path), str(target), str(2 * (LEARNED + UNSEEN))]
+    command = [sys.executable, "-c", ADD_RANDOM_POSES, str(path), str(target), str(2 * (LEARNED + UNSEEN))]
     subprocess.run(command, check=True, capture_output=True, timeout=300)
     return target if target.exists() else path
 
 
 def one_thread() -> dict[str, str]:
-    """An environment in which wall seconds are CPU seconds."""
+    """Environment with one BLAS thread, in which wall time is CPU time."""
     return {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 
 def contact_sheet(pictures: list[Path], target: Path) -> None:
-    """All pictures below each other in two columns, at half width."""
+    """Write all pictures to one, in two columns."""
     tiles = [Image.open(path).convert("RGB") for path in pictures if path.exists()]
     tiles = [tile.resize((SHEET_WIDTH // 2, tile.height * SHEET_WIDTH // 2 // tile.width)) for tile in tiles]
     height = max(tile.height for tile in tiles)

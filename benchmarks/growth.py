@@ -1,4 +1,4 @@
-"""A log–log plot as SVG, of seconds against size."""
+"""Log–log plot of seconds against vertices as SVG, for `benchmarks.speed`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ COLORS = {"eigsh": "#d55e00", "lapy": "#cc79a7", "exact": "#0072b2", "fast": "#0
 
 
 def plot(seconds: Mapping[str, Mapping[int, float]]) -> str:
-    """SVG text; `seconds` holds for each solver the seconds at each size."""
+    """Text of the SVG file; `seconds` maps each solver to its seconds by number of vertices."""
     sizes = [size for line in seconds.values() for size in line]
     times = [time for line in seconds.values() for time in line.values()]
     x_range = np.log10([min(sizes), max(sizes)])

@@ -1,7 +1,7 @@
-"""The whole job in Blender, by stage: `python -m benchmarks.job [--vertices 10000] [--poses 5] [--workers 1]`.
+"""Duration of each stage of a job: `python -m benchmarks.job [--vertices 10000] [--poses 5] [--workers 1]`.
 
-Makes a body in several poses as objects of a scene, learns its parts from them and writes labels, as the button does.
-Prints one line of JSON: wall and CPU seconds of each stage.
+Makes objects of one body in several poses, learns parts from them and writes labels, as Learn and Segment does. Prints
+one line of JSON: wall and CPU seconds of each stage.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from wks_segment.core.poses import describe
 
 
 def main() -> None:
-    """Run once and print."""
+    """Run the job once and print the result."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--vertices", type=int, default=10_000)
     parser.add_argument("--poses", type=int, default=5)
-    parser.add_argument("--workers", type=int, help="poses solved side by side")
+    parser.add_argument("--workers", type=int, help="poses that are computed at the same time")
     options = parser.parse_args()
     if options.workers:
         describe.MAX_WORKERS = options.workers
@@ -59,25 +59,25 @@ def main() -> None:
 
 
 def run() -> dict[str, dict[str, float]]:
-    """Wall and CPU seconds of each stage, from the objects to written labels."""
+    """Wall and CPU seconds of each stage, from reading the objects to writing the labels."""
     settings = bpy.context.scene.wks_segment
     settings.source = "OBJECTS"
-    report = Report([])
+    job = Run(Report([]))
     stages: dict[str, dict[str, float]] = {}
 
-    def timed(name: str, work: Callable[[], Any]) -> Any:
+    def timed(name: str, function: Callable[..., Any], *arguments: Any) -> Any:
         wall, cpu = time.perf_counter(), time.process_time()
-        result = work()
+        result = function(*arguments)
         stages[name] = {"wall": time.perf_counter() - wall, "cpu": time.process_time() - cpu}
         return result
 
     model = settings.new_model()
-    poses = timed("read", lambda: read_training_poses(bpy.context, settings))
-    described = timed("connect, eigenpairs, signature", lambda: pipeline.describe(model, poses, Run(report)))
-    timed("mixture", lambda: model.fit(described))
-    request = timed("read meshes", lambda: LabelRequest.of(settings, (pose.character for pose in poses)))
-    labels = timed("label", lambda: pipeline.label(model, poses, described, request, Run(report)))
-    timed("write", lambda: pipeline.write_outputs(settings, labels, request, report))
+    poses = timed("read", read_training_poses, bpy.context, settings)
+    described = timed("connect, eigenpairs, signature", pipeline.describe, model, poses, job)
+    timed("mixture", model.fit, described)
+    request = timed("read meshes", LabelRequest.of, settings, [pose.character for pose in poses])
+    labels = timed("label", pipeline.label, model, poses, described, request, job)
+    timed("write", pipeline.write_outputs, settings, labels, request, job.report)
     return stages
 
 

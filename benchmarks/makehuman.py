@@ -1,4 +1,4 @@
-"""MakeHuman's base mesh in poses, read from a copy of its `3dobjs` and `rigs` folders."""
+"""MakeHuman's base mesh in any pose, read from a copy of its `3dobjs` and `rigs` folders."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ BEND = {
     "upperarm01": 50, "lowerarm01": 60, "wrist": 25, "upperleg01": 40, "lowerleg01": 55, "foot": 20, "finger": 30,
     "spine0": 8, "neck0": 10, "head": 15, "clavicle": 10, "toe": 10, "jaw": 6,
 }  # fmt: skip
-"""Bones that move, by the beginning of their names, and the largest angle in degrees about each axis."""
+"""Bones that are rotated, by the beginning of their names, and the largest angle about each axis in degrees."""
 BODY = "body"
 JOINTS = {
     "Root": "root", "Spine1": "spine04", "Spine2": "spine03", "Spine3": "spine01", "Neck": "neck01", "Head": "head",
     "Clavicle": "clavicle", "UpArm": "upperarm01", "LoArm": "lowerarm01", "Hand": "wrist", "UpLeg": "upperleg01",
     "LoLeg": "lowerleg01", "Foot": "foot",
 }  # fmt: skip
-"""Bones of the rig for the joints of its older motion files, without the side."""
+"""Bone of the rig for each joint of older motion files, without the side."""
 
 
 @dataclass(frozen=True)
@@ -34,13 +34,13 @@ class MakeHuman:
     Attributes
     ----------
     vertices : (n, 3) array
-        In rest.
+        Points in the rest pose.
     faces : (m, 3) int array
-        Each quadrilateral is two triangles.
+        Triangles; each quadrilateral is split in two.
     group_of : (m,) array of str
-        The group of each triangle: "body", "joint-l-eye", …
+        Face group of each triangle: "body", "joint-l-eye", …
     bones : dict
-        Name to parent and head, parents first.
+        Name of each bone to its parent and the position of its head; parents come first.
     weights : (n, len(bones)) array
         Rows sum to 1.
     """
@@ -52,7 +52,7 @@ class MakeHuman:
     weights: FloatArray
 
     def posed(self, seed: int, body_only: bool = True) -> TriangleMesh:
-        """The mesh with its joints turned at random by a seed; 0 is the rest pose."""
+        """The mesh with randomly rotated joints; seed 0 is the rest pose."""
         generator = np.random.default_rng(seed)
         turns: dict[str, FloatArray] = {}
         for name, (parent, _) in self.bones.items():
@@ -62,21 +62,21 @@ class MakeHuman:
         return self.turned(turns, body_only)
 
     def turned(self, turns: dict[str, FloatArray], body_only: bool = True) -> TriangleMesh:
-        """The mesh with bones turned from rest by (3, 3) matrices in the world's axes; others follow their parents."""
+        """The mesh with bones rotated from rest by (3, 3) matrices in world axes; others follow their parents."""
         vertices = self._moved(turns)[0]
         faces = self.faces[self.group_of == BODY] if body_only else self.faces
         used, compact = np.unique(faces, return_inverse=True)
         return TriangleMesh(vertices[used], compact.reshape(-1, 3))
 
     def reshaped(self, scales: dict[str, FloatArray]) -> MakeHuman:
-        """Another body in rest: what hangs on a bone scaled by a (3, 3) matrix; others follow their parents."""
+        """Another body in rest pose, with bones scaled by (3, 3) matrices; others follow their parents."""
         vertices, places = self._moved(scales)
         heads = {name: place[:3, :3] @ self.bones[name][1] + place[:3, 3] for name, place in places.items()}
         bones = {name: (parent, heads[name]) for name, (parent, _) in self.bones.items()}
         return replace(self, vertices=vertices, bones=bones)
 
     def _moved(self, matrices: dict[str, FloatArray]) -> tuple[FloatArray, dict[str, FloatArray]]:
-        """Vertices and the (4, 4) placement of each bone, when a (3, 3) matrix acts on a bone about its head."""
+        """Vertices, and the (4, 4) matrix of each bone, after applying (3, 3) matrices to bones about their heads."""
         world: dict[str, FloatArray] = {}
         for name, (parent, head) in self.bones.items():
             before = world[parent] if parent else np.eye(4)
@@ -89,7 +89,7 @@ class MakeHuman:
 
 
 def load(folder: Path) -> MakeHuman:
-    """Read the files; OSError if one is missing."""
+    """Read mesh, rig and weights from a folder; OSError if a file is missing."""
     vertices, faces, group_of, group = [], [], [], ""
     for line in (folder / "3dobjs" / "base.obj").read_text(encoding="utf-8").splitlines():
         kind, *rest = line.split() or [""]
@@ -111,17 +111,17 @@ def load(folder: Path) -> MakeHuman:
                 bones[name] = bone["parent"], points[rig["joints"][bone["head"]]].mean(axis=0)
     place = {name: i for i, name in enumerate(bones)}
     weights = np.zeros((len(points), len(bones)))
-    of_bones = json.loads((folder / "rigs" / "default_weights.mhw").read_text(encoding="utf-8"))["weights"]
-    for name, pairs in of_bones.items():
-        where, how_much = np.array(pairs).T
-        weights[where.astype(int), place[name]] = how_much
+    weights_of_bones = json.loads((folder / "rigs" / "default_weights.mhw").read_text(encoding="utf-8"))["weights"]
+    for name, pairs in weights_of_bones.items():
+        indices, values = np.array(pairs).T
+        weights[indices.astype(int), place[name]] = values
     weights[weights.sum(axis=1) == 0, place["root"]] = 1
     weights /= weights.sum(axis=1, keepdims=True)
     return MakeHuman(points, np.array(faces), np.array(group_of), bones, weights)
 
 
 def motion(path: Path) -> list[dict[str, FloatArray]]:
-    """Frames of a BVH file for the rig: how each bone is turned from rest, in the axes of the mesh."""
+    """Frames of a BVH file: for each bone of the rig its rotation from rest, in the axes of the mesh."""
     joints: list[tuple[str, int, list[str]]] = []
     open_joints: list[int] = []
     lines = iter(path.read_text(encoding="utf-8").splitlines())
@@ -140,7 +140,7 @@ def motion(path: Path) -> list[dict[str, FloatArray]]:
             joints[-1][2].extend(words[2:])
         elif words[0] == "Frame":
             break
-    # Some have their height along z, the mesh has it along y.
+    # In some files the vertical axis is z; in the mesh it is y.
     upright = Rotation.from_euler("x", -90, degrees=True).as_matrix() if offset[2] > offset[1] else np.eye(3)
     return [_turns(joints, np.array(line.split(), dtype=float), upright) for line in lines if line.strip()]
 

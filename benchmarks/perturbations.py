@@ -1,7 +1,7 @@
-"""What scans, imports and artists do to a mesh, in strengths: noise, holes, glue, sampling and so on.
+"""Perturbations of a mesh, as they come from scans, imports and artists: noise, holes, glued surfaces, resampling.
 
-Each perturbation takes a mesh, a strength and a random generator, and gives the changed mesh together with the face of
-the clean one that each of its faces stands for.
+Each function takes a mesh, a strength and a random generator, and returns the changed mesh with, for each of its faces,
+the index of the corresponding face of the original mesh, or −1.
 """
 
 from __future__ import annotations
@@ -18,31 +18,33 @@ from wks_segment.core.mesh.triangle_mesh import FloatArray, IntArray, unique_edg
 
 Perturbed = tuple[TriangleMesh, IntArray]
 
-SHOT = 0.05
-"""How far shot noise throws a vertex, as a fraction of the diagonal of the bounding box."""
-HOLE, LARGE_HOLE = 0.02, 0.03
-"""Radius of a hole, as the same fraction. A large one takes a whole forearm or foot off."""
-REACH = 0.15
-"""How far a glued triangle reaches at most, as the same fraction."""
+SHOT_DISTANCE = 0.05
+"""Distance by which shot noise moves a vertex, relative to the diagonal of the bounding box."""
+HOLE_RADIUS, LARGE_HOLE_RADIUS = 0.02, 0.03
+"""Radius of holes, relative to the same diagonal. A large hole can cut off a forearm or a foot."""
+GLUE_DISTANCE = 0.15
+"""Largest length of a glued triangle, relative to the same diagonal."""
 
 
 def noise(mesh: TriangleMesh, strength: float, generator: np.random.Generator) -> Perturbed:
-    """Every vertex moved by a normal deviate of `strength` times the mean edge length."""
+    """Move each vertex by a normal deviate of `strength` times the mean edge length."""
     shift = strength * _mean_edge(mesh) * generator.standard_normal(mesh.vertices.shape) / np.sqrt(3)
     return TriangleMesh(mesh.vertices + shift, mesh.faces), np.arange(mesh.n_faces)
 
 
 def shot_noise(mesh: TriangleMesh, strength: float, generator: np.random.Generator) -> Perturbed:
-    """A share of the vertices thrown far off."""
+    """Move a share of the vertices far away."""
     chosen = generator.choice(mesh.n_vertices, max(1, round(strength * mesh.n_vertices)), replace=False)
     direction = generator.standard_normal((len(chosen), 3))
     vertices = mesh.vertices.copy()
-    vertices[chosen] += SHOT * _diagonal(mesh) * direction / np.linalg.norm(direction, axis=1)[:, None]
+    vertices[chosen] += SHOT_DISTANCE * _diagonal(mesh) * direction / np.linalg.norm(direction, axis=1)[:, None]
     return TriangleMesh(vertices, mesh.faces), np.arange(mesh.n_faces)
 
 
-def holes(mesh: TriangleMesh, strength: float, generator: np.random.Generator, radius: float = HOLE) -> Perturbed:
-    """A number of round holes, at places drawn by area."""
+def holes(
+    mesh: TriangleMesh, strength: float, generator: np.random.Generator, radius: float = HOLE_RADIUS
+) -> Perturbed:
+    """Cut round holes at random places."""
     kept = np.ones(mesh.n_faces, dtype=bool)
     centers = mesh.vertices[mesh.faces].mean(axis=1)
     for face in generator.choice(mesh.n_faces, round(strength), p=mesh.face_areas / mesh.area):
@@ -51,13 +53,13 @@ def holes(mesh: TriangleMesh, strength: float, generator: np.random.Generator, r
 
 
 def glued(mesh: TriangleMesh, strength: float, generator: np.random.Generator) -> Perturbed:
-    """A number of triangles between places that are near in space and not on the surface."""
+    """Add triangles between points that are near in space but not on the surface."""
     added: list[IntArray] = []
     near = cKDTree(mesh.vertices)
     normals = _vertex_normals(mesh)
     while len(added) < round(strength):
         face = mesh.faces[generator.integers(mesh.n_faces)]
-        others = np.array(near.query_ball_point(mesh.vertices[face[0]], REACH * _diagonal(mesh)))
+        others = np.array(near.query_ball_point(mesh.vertices[face[0]], GLUE_DISTANCE * _diagonal(mesh)))
         facing = others[normals[others] @ normals[face[0]] < -0.5]
         if facing.size:
             added.append(np.array([face[0], face[1], generator.choice(facing)]))
@@ -67,7 +69,7 @@ def glued(mesh: TriangleMesh, strength: float, generator: np.random.Generator) -
 
 
 def sampling(mesh: TriangleMesh, strength: float, generator: np.random.Generator) -> Perturbed:
-    """The mesh with 1 / `strength` of its faces, by Blender's Decimate modifier."""
+    """Reduce the faces to 1 / `strength` of their number by Blender's Decimate modifier."""
     import bpy
 
     data = bpy.data.meshes.new("sampled")
@@ -89,7 +91,7 @@ def sampling(mesh: TriangleMesh, strength: float, generator: np.random.Generator
 
 
 def finer(mesh: TriangleMesh, strength: float, generator: np.random.Generator) -> Perturbed:
-    """Half of the mesh, on one side of a random plane through its middle, split into four, `strength` times."""
+    """Split each face on one side of a random plane through the middle into four, `strength` times."""
     vertices, faces, owner = mesh.vertices, mesh.faces, np.arange(mesh.n_faces)
     side = mesh.vertices @ generator.standard_normal(3)
     side -= np.median(side)
@@ -112,12 +114,12 @@ PERTURBATIONS: dict[str, Perturbation] = {
     "noise": (noise, (0.05, 0.15, 0.25)),
     "shot noise": (shot_noise, (0.002, 0.005, 0.01)),
     "holes": (holes, (2, 5, 10)),
-    "large holes": (partial(holes, radius=LARGE_HOLE), (2, 5, 10)),
+    "large holes": (partial(holes, radius=LARGE_HOLE_RADIUS), (2, 5, 10)),
     "glued": (glued, (3, 8, 15)),
     "sampling": (sampling, (1.5, 2.5, 3.5)),
     "finer on one side": (finer, (1, 2, 3)),
 }
-"""Each with its weak, middle and strongest strength."""
+"""Name to the function and its weak, medium and strong strength."""
 
 
 def _diagonal(mesh: TriangleMesh) -> float:
@@ -131,14 +133,14 @@ def _mean_edge(mesh: TriangleMesh) -> float:
 
 def _vertex_normals(mesh: TriangleMesh) -> FloatArray:
     a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
-    of_faces = np.cross(b - a, c - a)
+    face_normals = np.cross(b - a, c - a)
     normals = np.zeros((mesh.n_vertices, 3))
     for i in range(3):
-        np.add.at(normals, mesh.faces[:, i], of_faces)
+        np.add.at(normals, mesh.faces[:, i], face_normals)
     return normals / np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
 
 
 def _of_faces(mesh: TriangleMesh, faces: IntArray) -> TriangleMesh:
-    """Some faces of a mesh, and the vertices that they use."""
+    """The mesh with only some of its faces, and the vertices that they use."""
     used, compact = np.unique(faces, return_inverse=True)
     return TriangleMesh(mesh.vertices[used], compact.reshape(-1, 3))

@@ -1,19 +1,20 @@
-"""How good the parts are: `python -m benchmarks.quality WHAT DATA [--output FOLDER]`.
+"""Quality of the parts: `python -m benchmarks.quality STUDY DATA [--output FOLDER]`.
 
-WHAT is one of
+STUDY is one of
 
-consistency  area of unseen poses that has the learned label (characters, and MakeHuman's body in its own motions)
-bodies       the same area on other bodies: MakeHuman's with other bones and other flesh
-choices      consistency and human, of MakeHuman's body and the Princeton humans, with other poses learned
-human        connected parts against people's (Rand-index error), components against part names (adjusted Rand index)
+consistency  share of the area of unseen poses with the learned label (characters, and MakeHuman's body in motions)
+bodies       the same for bodies of other proportions, made from MakeHuman's
+choices      consistency and human with other learned poses, for MakeHuman's body and the Princeton humans
+human        regions compared with segmentations by people (Rand-index error), segments with part names (adjusted Rand
+             index)
 seeds        adjusted Rand index between the labels of models that were learned with five seeds
-retrieval    share of shapes whose class has the model that `rank` puts first: Princeton classes and characters
-remesh       area that keeps its label when a mesh is resampled to half and to twice its faces
+retrieval    share of shapes for which `rank` finds the right class: Princeton classes and characters
+remesh       share of the area that keeps its label when a mesh is resampled to half and to twice its faces
 robustness   the same for damaged meshes (as `benchmarks.robustness`)
 
-DATA is a folder with `characters` (what Blender imports), `makehuman` (its `3dobjs`, `rigs` and motions) and `psb` (the
-Princeton benchmark as .npz, numbered as there). Prints Markdown tables, the paper's setting beside the default, and
-writes pictures.
+DATA is a folder with `characters` (files that Blender imports), `makehuman` (its `3dobjs`, `rigs` and motions) and
+`psb` (the Princeton benchmark as .npz files with its numbers). Prints Markdown tables for the default and the paper's
+preset, and writes pictures.
 """
 
 from __future__ import annotations
@@ -35,39 +36,39 @@ from wks_segment.core import PoseSegmentation, PoseSignature, TriangleMesh, conn
 from wks_segment.core.mesh.triangle_mesh import FloatArray, IntArray
 
 PRESETS = ("default", "paper")
-CLASSES = {"human": 1, "chair": 101, "octopus": 121, "plier": 201, "fish": 221}
-"""First number of each class of twenty in the Princeton benchmark."""
-LEARNED = (0, 4, 8, 12, 16)
-"""Models of a class that are learned from: 1, 5, 9, 13 and 17."""
+PRINCETON_CLASSES = {"human": 1, "chair": 101, "octopus": 121, "plier": 201, "fish": 221}
+"""Number of the first of the twenty shapes of each class in the Princeton benchmark."""
+LEARNED_SHAPES = (0, 4, 8, 12, 16)
+"""Indices of the shapes of a class that are learned."""
 MOTIONS_LEARNED = ("walk1 0", "walk1 7", "zombieWalk1 12", "benchmark 0", "tpose 0")
 FRAMES = 6
-"""Frames of a motion that are taken, first and last among them."""
+"""Number of frames of each motion, including the first and the last."""
 OTHER_BODIES = range(1, 7)
 """Seeds of the other bodies."""
 OTHER_MOTIONS = ("zombieWalk1 24", "walk1 5", "dance1 0")
-"""Frames that the other bodies are seen in, none of them learned. The first is in the picture."""
+"""Unseen frames for the other bodies. The first is in the picture."""
 CHOICES = range(5)
-"""Seeds of what is learned; 0 stands for `LEARNED` and `MOTIONS_LEARNED`."""
+"""Seeds of the choice of learned poses; 0 stands for `LEARNED_SHAPES` and `MOTIONS_LEARNED`."""
 SEEDS = range(5)
 Described = dict[str, PoseSignature]
 Frame = dict[str, FloatArray]
-"""How each bone is turned, see `makehuman.motion`."""
+"""Rotation of each bone, see `makehuman.motion`."""
 
 
 def main() -> None:
     """Run one of the studies."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=STUDIES)
-    parser.add_argument("data", type=Path)
+    parser.add_argument("study", choices=STUDIES, metavar="STUDY")
+    parser.add_argument("data", type=Path, metavar="DATA")
     parser.add_argument("--output", type=Path, default=Path("demo/quality"))
     parser.add_argument("--segments", type=int, default=8)
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
-    STUDIES[options.what](options)
+    STUDIES[options.study](options)
 
 
 def consistency(options: argparse.Namespace) -> None:
-    """Unseen frames of the characters, unseen motions of MakeHuman's body."""
+    """Consistency of labels in unseen frames of characters and unseen motions of MakeHuman's body."""
     for preset in PRESETS:
         print(f"\n### {preset}\n\n| character | vertices | CPU s a pose | learned | unseen | worst |\n|{'---|' * 6}")
         settings = ["--segments", str(options.segments), "--preset", preset]
@@ -91,7 +92,7 @@ def consistency(options: argparse.Namespace) -> None:
 
 
 def bodies(options: argparse.Namespace) -> None:
-    """Other bodies in unseen frames, with what was learned of MakeHuman's."""
+    """Consistency of labels on other bodies in unseen frames, with a model of MakeHuman's body."""
     folder = options.data / "makehuman"
     body, frames, described = makehuman.load(folder), _frames(folder), _motions(folder)
     poses, shown = {name: described[name] for name in MOTIONS_LEARNED}, OTHER_MOTIONS[0]
@@ -109,11 +110,11 @@ def bodies(options: argparse.Namespace) -> None:
 
 
 def choices(options: argparse.Namespace) -> None:
-    """How much depends on which poses or shapes are learned."""
+    """Dependence of the results on the choice of learned poses or shapes."""
     body = _motions(options.data / "makehuman")
     truth, humans = _princeton(options.data / "psb", "human")
     of_body = _choices(list(body), MOTIONS_LEARNED)
-    of_humans = _choices(list(humans), [list(humans)[i] for i in LEARNED])
+    of_humans = _choices(list(humans), [list(humans)[i] for i in LEARNED_SHAPES])
     print(f"| {len(CHOICES)} choices | setting | each | mean | spread | worst pose |\n|{'---|' * 6}")
     pairs = []
     for preset in PRESETS:
@@ -137,17 +138,17 @@ def choices(options: argparse.Namespace) -> None:
 
 
 def human(options: argparse.Namespace) -> None:
-    """Connected parts and components of the Princeton classes against those of people."""
+    """Regions and segments of the Princeton classes compared with segmentations and part names by people."""
     print("| class | setting | Rand-index error | regions | people against each other | their parts | part names |")
     print("|" + "---|" * 7)
     errors: dict[str, list[float]] = {preset: [] for preset in PRESETS}
-    for name in CLASSES:
+    for name in PRINCETON_CLASSES:
         truth, described = _princeton(options.data / "psb", name)
         shapes = list(described)
         people = [agreement.of_people(t["human_segmentations"]) for t in truth.values()]
         parts = [len(np.unique(one)) for t in truth.values() for one in t["human_segmentations"]]
         for preset in PRESETS:
-            model, learned = _model(options, preset), [shapes[i] for i in LEARNED]
+            model, learned = _model(options, preset), [shapes[i] for i in LEARNED_SHAPES]
             found = agreement.with_people(model, described, learned, truth)
             n_regions = [len(np.unique(region)) for region in found.regions.values()]
             errors[preset].append(float(np.mean(found.errors)))
@@ -166,11 +167,11 @@ def human(options: argparse.Namespace) -> None:
 
 
 def seeds(options: argparse.Namespace) -> None:
-    """Labels of models that differ by their seed only."""
+    """Agreement of models that differ only in their seed."""
     print("| learned from | setting | mean of all pairs | lowest |\n|---|---|---|---|")
     _, humans = _princeton(options.data / "psb", "human")
     shapes = list(humans)
-    sets = {"Princeton humans": ([humans[shapes[i]] for i in LEARNED], [humans[s] for s in shapes[1::4]])}
+    sets = {"Princeton humans": ([humans[shapes[i]] for i in LEARNED_SHAPES], [humans[s] for s in shapes[1::4]])}
     body = _motions(options.data / "makehuman")
     sets["MakeHuman"] = [body[n] for n in MOTIONS_LEARNED], [d for n, d in body.items() if n not in MOTIONS_LEARNED]
     for name, (learned, others) in sets.items():
@@ -185,10 +186,10 @@ def seeds(options: argparse.Namespace) -> None:
 
 
 def which_class(options: argparse.Namespace) -> None:
-    """The paper's section 5, on the Princeton classes and on the characters; exit code 1 below the floors."""
-    shapes = {name: list(_princeton(options.data / "psb", name)[1].values()) for name in CLASSES}
+    """Retrieval (section 5 of the paper) on Princeton classes and characters; exit code 1 below the lower limits."""
+    shapes = {name: list(_princeton(options.data / "psb", name)[1].values()) for name in PRINCETON_CLASSES}
     rates: dict[str, float] = {}
-    chosen = _choices([str(i) for i in range(20)], [str(i) for i in LEARNED])
+    chosen = _choices([str(i) for i in range(20)], [str(i) for i in LEARNED_SHAPES])
     for choice in chosen:
         found = retrieval.retrieved(lambda: _model(options, "default"), shapes, [int(i) for i in choice])
         retrieval.report(f"learned {' '.join(choice)}", found)
@@ -197,24 +198,24 @@ def which_class(options: argparse.Namespace) -> None:
         rates["Princeton" if not rates else " ".join(choice)] = found.rate
     each = list(rates.values())
     print(f"\nfive choices: mean {np.mean(each):.1%}, spread {np.std(each, ddof=1):.1%}, worst {min(each):.1%}")
-    retrieval.report("paper", retrieval.retrieved(lambda: _model(options, "paper"), shapes, LEARNED))
+    retrieval.report("paper", retrieval.retrieved(lambda: _model(options, "paper"), shapes, LEARNED_SHAPES))
     found = retrieval.of_characters(options.data / "characters", options.output)
     retrieval.report("characters", found)
     rates["characters"] = found.rate
-    failed = [name for name, floor in retrieval.FLOORS.items() if rates[name] < floor]
+    failed = [name for name, limit in retrieval.LOWER_LIMITS.items() if rates[name] < limit]
     if failed:
-        sys.exit(f"below the floor: {', '.join(failed)}")
+        sys.exit(f"below the lower limit: {', '.join(failed)}")
 
 
 def remesh(options: argparse.Namespace) -> None:
-    """MakeHuman's body with half of its faces, by Decimate, and with twice as many."""
+    """Labels of MakeHuman's body resampled to half and to twice its faces."""
     body = makehuman.load(options.data / "makehuman")
-    clean = [body.posed(seed) for seed in robustness.TESTED]
+    clean = [body.posed(seed) for seed in robustness.TESTED_SEEDS]
     print("| resampled to | default | paper |\n|---|---|---|")
     kinds = {"half the faces": ("sampling", 2.0), "twice the faces, on one side four times": ("finer on one side", 1.0)}
     rows: dict[str, list[str]] = {kind: [] for kind in kinds}
     for preset in PRESETS:
-        model = _model(options, preset).fit([body.posed(seed) for seed in robustness.LEARNED])
+        model = _model(options, preset).fit([body.posed(seed) for seed in robustness.LEARNED_SEEDS])
         expected = [model.segment_faces(mesh) for mesh in clean]
         for kind, (name, strength) in kinds.items():
             resampled = perturbations.PERTURBATIONS[name][0], (strength,)
@@ -224,7 +225,7 @@ def remesh(options: argparse.Namespace) -> None:
 
 
 def damage(options: argparse.Namespace) -> None:
-    """The table of `benchmarks.robustness`, for both settings."""
+    """The table of `benchmarks.robustness` for both presets."""
     for preset in PRESETS:
         print(f"\n### {preset}\n")
         robustness.table(options.data / "makehuman", _model(options, preset))
@@ -241,8 +242,8 @@ def _model(options: argparse.Namespace, preset: str) -> PoseSegmentation:
 
 
 def _princeton(folder: Path, name: str) -> tuple[dict[str, Any], Described]:
-    """Arrays and signatures of a class. Both settings share the signatures: they are of the same eigenpairs."""
-    numbers = [CLASSES[name] + i for i in range(20)]
+    """Arrays and signatures of a class; both presets share the signatures, which have the same eigenpairs."""
+    numbers = [PRINCETON_CLASSES[name] + i for i in range(20)]
     truth = {f"{name} {number}": np.load(folder / f"{number}.npz") for number in numbers}
     meshes = [TriangleMesh(arrays["vertices"], arrays["faces"]) for arrays in truth.values()]
     found = PoseSegmentation().describe_all(meshes, [connect(mesh) for mesh in meshes])
@@ -250,7 +251,7 @@ def _princeton(folder: Path, name: str) -> tuple[dict[str, Any], Described]:
 
 
 def _frames(folder: Path) -> dict[str, Frame]:
-    """Some frames of each of MakeHuman's own motions."""
+    """Some frames of each of MakeHuman's motions."""
     frames = {}
     for path in sorted(folder.rglob("*.bvh")):
         motion = makehuman.motion(path)
@@ -260,12 +261,12 @@ def _frames(folder: Path) -> dict[str, Frame]:
 
 
 def _motions(folder: Path) -> Described:
-    """MakeHuman's body in these frames."""
+    """MakeHuman's body described in some frames of each motion."""
     return _described(makehuman.load(folder), _frames(folder))
 
 
 def _described(body: makehuman.MakeHuman, frames: Mapping[str, Frame]) -> Described:
-    """A body in some frames, which tell together what is connected."""
+    """A body described in some frames, with one connection of its islands for all frames."""
     meshes = [body.turned(frame) for frame in frames.values()]
     connection = connect(*meshes, rest=body.posed(0))
     found = PoseSegmentation().describe_all(meshes, [connection] * len(meshes))
@@ -273,7 +274,7 @@ def _described(body: makehuman.MakeHuman, frames: Mapping[str, Frame]) -> Descri
 
 
 def _choices(names: Sequence[str], first: Sequence[str]) -> list[Sequence[str]]:
-    """The first choice of some names, as given, and as many names drawn from all for each further seed."""
+    """The given first choice, and for each further seed a random choice of as many names."""
     drawn = (np.random.default_rng(seed).permutation(len(names))[: len(first)] for seed in CHOICES[1:])
     return [first, *([names[i] for i in sorted(chosen)] for chosen in drawn)]
 
@@ -283,14 +284,14 @@ def _predicted(model: PoseSegmentation, described: Iterable[PoseSignature]) -> I
 
 
 def _print_shares(title: str, shares: Mapping[str, Sequence[float]]) -> None:
-    """A table of the settings' shares of area."""
+    """Print a table of the shares of area of each preset."""
     print(f"\n| {title} | mean | worst |\n|---|---|---|")
     for preset, each in shares.items():
         print(table_row([preset, f"{np.mean(each):.4f}", f"{min(each):.3f}"]))
 
 
 def _choices_row(what: str, preset: str, of_choices: Sequence[Sequence[float]], worst: Callable[[Any], float]) -> str:
-    """A measure's mean for each choice, their mean and standard deviation, and its worst value."""
+    """Row with the mean of a measure for each choice, mean and standard deviation of these, and the worst value."""
     each = [float(np.mean(one)) for one in of_choices]
     return table_row([
         what, preset, " ".join(f"{mean:.3f}" for mean in each), f"{np.mean(each):.3f}", f"{np.std(each, ddof=1):.3f}",
@@ -299,13 +300,13 @@ def _choices_row(what: str, preset: str, of_choices: Sequence[Sequence[float]], 
 
 
 def _pairs_row(what: str, preset: str, labels: Sequence[IntArray]) -> str:
-    """How far models agree on what belongs together."""
+    """Row with the agreement of all pairs of labelings."""
     pairs = agreement.of_pairs(labels)
     return table_row([what, preset, f"{np.mean(pairs):.3f}", f"{min(pairs):.3f}"])
 
 
 def _picture(shapes: Sequence[tuple[str, PoseSignature, IntArray]], path: Path) -> None:
-    """Shapes in the colors of their faces' labels, from y upwards turned to Blender's z upwards."""
+    """Render shapes in the colors of their labels, rotated from y up to Blender's z up."""
     from wks_segment.blender.render.contact_sheet import Tile, render_poses
     from wks_segment.blender.scene.poses import Pose
 

@@ -1,8 +1,8 @@
-"""How long Blender's window stands still while it learns: `python -m benchmarks.redraws [--blender 5.2]`.
+"""Time between redraws of Blender's window while it learns: `python -m benchmarks.redraws [--blender 5.2]`.
 
-Opens a real Blender (`tests/window` says how, and what it needs; it is looked for, or installed, in the folder that
-WKS_SEGMENT_WINDOW names), presses Learn and Segment with a real mouse, and lets the viewport be drawn all the time.
-Prints a table: seconds until the segments are there, redraws in that time, and the time between two of them.
+Opens a real Blender, clicks Learn and Segment with the mouse, and redraws the viewport all the time. Blender is taken
+from the folder that WKS_SEGMENT_WINDOW names, or installed there; `tests/window` says what that needs. Prints a table:
+seconds until the segments are written, number of redraws in that time, and the time between two of them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ HEADER = "| Blender | poses × vertices | learned in | redraws | median gap | 99
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure all versions of Blender."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--blender", nargs="+", choices=SUITES, default=list(SUITES))
     parser.add_argument("--vertices", type=int, default=20_000)
@@ -46,14 +46,14 @@ def main() -> None:
 
 
 def save_bodies(path: Path, n_poses: int, n_vertices: int) -> None:
-    """Write a body in several poses, for `make_scene.py`."""
+    """Write a body in several poses to a file for `make_scene.py`."""
     bodies = [shapes.body(n_vertices, bend=0.2 * i) for i in range(n_poses)]
     arrays = {f"vertices_{i}": body.vertices for i, body in enumerate(bodies)}
     np.savez(path, **arrays, **{f"faces_{i}": body.faces for i, body in enumerate(bodies)})
 
 
 def gaps_while_learning(blender: RealBlender, bodies: Path) -> list[float]:
-    """Seconds between redraws, from the click on the button until the segments are written."""
+    """Seconds between redraws, from the click until the segments are written."""
     blender.start(blender.make_scene(blender.bring(bodies), "bodies.blend"))
     blender.ask("zoom_to_all")
     blender.open_sidebar()

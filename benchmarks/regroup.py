@@ -1,8 +1,7 @@
-"""A model cut at another number of segments beside one that is fitted for it: `python -m benchmarks.regroup FILE…`.
+"""Another number of segments without a new fit, compared with a new fit: `python -m benchmarks.regroup FILE…`.
 
-Each file is imported by Blender, and five frames of its animation are learned with eight segments. Prints a Markdown
-table of the share of the area whose label is the same as that of a fresh fit, after the best matching of segments, on
-the learned poses together.
+Five frames of the animation in each file are learned with eight segments. Prints a Markdown table of the share of the
+area with the same label as in a new fit with another number of segments, after the best matching of segments.
 """
 
 from __future__ import annotations
@@ -28,10 +27,11 @@ from wks_segment.core import PoseSegmentation
 from wks_segment.core.mesh.triangle_mesh import FloatArray, IntArray
 
 NUMBERS = (4, 6, 10, 12, 16)
+"""Numbers of segments to compare."""
 
 
 def main() -> None:
-    """Run over the files."""
+    """Compare on all files."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("files", type=Path, nargs="+")
     options = parser.parse_args()
@@ -52,27 +52,28 @@ def main() -> None:
 
 
 def agreements(path: Path) -> list[float]:
-    """Of the regrouped with the fresh model, for each number."""
+    """Agreement of the regrouped model with a new one, for each number of segments."""
     (objects,) = file_formats.open_files([path])
     for obj in objects:
         obj.select_set(obj.type == "MESH")
-    settings, report = bpy.context.scene.wks_segment, Report([])
+    settings = bpy.context.scene.wks_segment
     poses = read_training_poses(bpy.context, settings)
     polygons, rest = [pose.polygon_of for pose in poses], poses[0].upright
     eight = settings.new_model()
-    described = pipeline.describe(eight, poses, Run(report))
+    described = pipeline.describe(eight, poses, Run(Report([])))
     eight.fit(described, rest=rest)
     areas = np.bincount(polygons[0], poses[0].mesh.face_areas).astype(np.float64)
-    found = []
+    shares = []
     for number in NUMBERS:
         fresh = PoseSegmentation(number).fit(described, rest=rest)
-        ours, theirs = (model.segment_polygons(described, polygons) for model in (eight.with_segments(number), fresh))
-        found.append(alike(ours, theirs, areas))
-    return found
+        regrouped = eight.with_segments(number).segment_polygons(described, polygons)
+        refitted = fresh.segment_polygons(described, polygons)
+        shares.append(matched_share(regrouped, refitted, areas))
+    return shares
 
 
-def alike(labels: IntArray, others: IntArray, areas: FloatArray) -> float:
-    """Share of the area with the same label, after the best matching."""
+def matched_share(labels: IntArray, others: IntArray, areas: FloatArray) -> float:
+    """Share of the area with the same label, after the best matching of labels."""
     shared = coo_matrix((areas, (labels, others))).toarray()
     return float(shared[linear_sum_assignment(-shared)].sum() / areas.sum())
 

@@ -1,4 +1,4 @@
-"""Which class is it: the paper's section 5, as `wks_segment rank` answers it. Part of `benchmarks.quality`."""
+"""Retrieval of a shape's class (section 5 of the paper), as by `wks_segment rank`. Part of `benchmarks.quality`."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from benchmarks import characters
 from benchmarks.speed import table_row
 from wks_segment.core import PoseSegmentation, PoseSignature, Retrieval, retrieve
 
-FLOORS = {"Princeton": 0.97, "characters": 1.0}
-"""Least share of right answers, of the first choice of what is learned."""
+LOWER_LIMITS = {"Princeton": 0.97, "characters": 1.0}
+"""Smallest share of right answers that the study accepts, for the first choice of learned shapes."""
 VERDICTS = ("sure", "unsure", "nothing fits")
 
 
 def retrieved(
     new_model: Callable[[], PoseSegmentation], shapes: Mapping[str, Sequence[PoseSignature]], learned: Sequence[int]
 ) -> Retrieval:
-    """Models of some shapes of each class, asked for all others."""
+    """Learn a model of some shapes of each class, and find the class of all others."""
     models = {name: new_model().fit([each[i] for i in learned]) for name, each in shapes.items()}
     asked = {name: [one for i, one in enumerate(each) if i not in learned] for name, each in shapes.items()}
     return retrieve(models, asked)
 
 
 def of_characters(folder: Path, output: Path) -> Retrieval:
-    """By the command line itself: five frames of each character learned, three others asked for."""
+    """Run the command line: learn five frames of each character, and find the character of three others."""
     posed = output / "posed"
     posed.mkdir(parents=True, exist_ok=True)
     for path in sorted(path for path in folder.iterdir() if path.suffix in characters.FILES):
@@ -47,7 +47,7 @@ def of_characters(folder: Path, output: Path) -> Retrieval:
 
 
 def picture(found: Retrieval, path: Path) -> None:
-    """Write the confusion matrix as a picture."""
+    """Write a picture of the confusion matrix."""
     from wks_segment.blender.render.confusion_matrix import render_matrix
 
     render_matrix(found, path)
@@ -55,7 +55,7 @@ def picture(found: Retrieval, path: Path) -> None:
 
 
 def report(title: str, found: Retrieval) -> None:
-    """Print the confusion matrix, the rate, and how sure the answers were."""
+    """Print the confusion matrix, the share of right answers, and the verdicts."""
     print(f"\n| {title}: queries of | {' | '.join(found.names)} |\n|{'---|' * (len(found.names) + 1)}")
     for name, row in zip(found.names, found.confusion, strict=True):
         print(table_row([name, *map(str, row)]))

@@ -1,7 +1,7 @@
-"""Labels of damaged meshes against those of clean ones: `python -m benchmarks.robustness MAKEHUMAN_FOLDER`.
+"""Labels of damaged meshes compared with those of clean ones: `python -m benchmarks.robustness MAKEHUMAN_FOLDER`.
 
-A model is learned on four clean poses of a body and applied to poses that it never saw, clean and damaged. Prints a
-Markdown table of the share of the damaged mesh's area that has the label which the clean one has there.
+A model is learned from four clean poses of a body and applied to unseen poses, clean and damaged. Prints a Markdown
+table of the share of the area on which the damaged mesh has the same label as the clean one.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from benchmarks.speed import table_row
 from wks_segment.core import PoseSegmentation, TriangleMesh
 from wks_segment.core.mesh.triangle_mesh import IntArray
 
-LEARNED, TESTED = (1, 2, 3, 4), (5, 6)
-"""Seeds of the poses."""
+LEARNED_SEEDS, TESTED_SEEDS = (1, 2, 3, 4), (5, 6)
+"""Seeds of the random poses that are learned and of those that are labeled."""
 
 
 def main() -> None:
-    """Learn, damage, label, print."""
+    """Measure the damages that the options ask for."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--segments", type=int, default=8)
@@ -38,12 +38,12 @@ def main() -> None:
 
 
 def table(folder: Path, model: PoseSegmentation, kinds: Sequence[str] = tuple(PERTURBATIONS)) -> None:
-    """Learn a model on clean poses of the body and print how much of damaged ones keeps its label."""
+    """Fit a model to clean poses of the body; print the agreement of labels for each kind of damage."""
     body = makehuman.load(folder)
-    model.fit([body.posed(seed) for seed in LEARNED])
-    clean = [body.posed(seed) for seed in TESTED]
+    model.fit([body.posed(seed) for seed in LEARNED_SEEDS])
+    clean = [body.posed(seed) for seed in TESTED_SEEDS]
     expected = [model.segment_faces(mesh) for mesh in clean]
-    print(table_row(["damage", "weak", "middle", "strongest"]) + "\n" + table_row(["---"] * 4))
+    print(table_row(["damage", "weak", "medium", "strong"]) + "\n" + table_row(["---"] * 4))
     for kind in kinds:
         shares = agreements(model, PERTURBATIONS[kind], clean, expected)
         print(table_row([kind, *(f"{share:.3f}" for share in shares)]), flush=True)
@@ -52,7 +52,7 @@ def table(folder: Path, model: PoseSegmentation, kinds: Sequence[str] = tuple(PE
 def agreements(
     model: PoseSegmentation, perturbation: Perturbation, clean: Sequence[TriangleMesh], expected: Sequence[IntArray]
 ) -> list[float]:
-    """Share of the area that keeps its label at each strength, the mean of all meshes."""
+    """Share of the area that keeps its label, for each strength, averaged over all meshes."""
     damage, strengths = perturbation
     shares = []
     for strength in strengths:
@@ -61,9 +61,9 @@ def agreements(
             damaged, owner = damage(mesh, strength, np.random.default_rng(i))
             known = owner >= 0
             same = model.segment_faces(damaged)[known] == expected[i][owner[known]]
-            # The area that a face stands for is that of the clean mesh: noise and spikes make more of it.
-            pieces = np.bincount(owner[known], minlength=mesh.n_faces)
-            of_meshes.append(np.average(same, weights=(mesh.face_areas / np.maximum(pieces, 1))[owner[known]]))
+            # Areas are those of the clean mesh, since noise and spikes enlarge those of the damaged one.
+            counts = np.bincount(owner[known], minlength=mesh.n_faces)
+            of_meshes.append(np.average(same, weights=(mesh.face_areas / np.maximum(counts, 1))[owner[known]]))
         shares.append(float(np.mean(of_meshes)))
     return shares
 

@@ -1,4 +1,4 @@
-"""Meshes that the benchmarks make themselves: organic bodies with limbs, of any number of vertices."""
+"""Meshes for the benchmarks: bodies with limbs, with any number of vertices."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ LIMBS = (
     ((0.2, -0.5, -0.9), 1.4, 0.30),
     ((0.0, 0.0, 1.0), 2.0, 0.25),
 )
-"""Direction, length and width of each limb that is pulled out of a unit sphere."""
+"""Direction, length and width of each limb, by which a unit sphere is deformed."""
 
 
 def body(n_vertices: int, bend: float = 0.3, irregular: bool = False) -> TriangleMesh:
-    """A closed body with six limbs; `bend` poses it. Even triangles, or those of vertices strewn at random."""
+    """A closed body with six limbs, posed by `bend`; its vertices are spread evenly, or at random if `irregular`."""
     if irregular:
         points = np.random.default_rng(0).standard_normal((n_vertices, 3))
     else:
-        # Fibonacci's sphere: the next point a golden angle further, at equal steps of height.
+        # Fibonacci sphere: each point is a golden angle further, at equal steps of height.
         height = 1 - (2 * np.arange(n_vertices) + 1) / n_vertices
         angle = np.pi * (3 - 5**0.5) * np.arange(n_vertices)
         radius = np.sqrt(1 - height**2)
@@ -37,12 +37,12 @@ def body(n_vertices: int, bend: float = 0.3, irregular: bool = False) -> Triangl
     return TriangleMesh(_posed(_with_limbs(points), bend), faces)
 
 
-LEFT = 0.84
-"""Share of the vertices that `with_border` leaves."""
+KEPT_SHARE = 0.84
+"""Share of the vertices that `with_border` keeps."""
 
 
 def with_border(mesh: TriangleMesh) -> TriangleMesh:
-    """The mesh cut open below: a sixth of its height is gone."""
+    """The mesh without the sixth of its faces that is lowest."""
     height = mesh.vertices[mesh.faces, 2].mean(axis=1)
     kept = mesh.faces[height > np.quantile(height, 1 / 6)]
     used, faces = np.unique(kept, return_inverse=True)
@@ -50,17 +50,17 @@ def with_border(mesh: TriangleMesh) -> TriangleMesh:
 
 
 def thinned(mesh: TriangleMesh) -> TriangleMesh:
-    """The mesh pressed flat, to a fiftieth of its height: two sides that almost touch."""
+    """The mesh scaled to a fiftieth of its height, so that two sides almost touch."""
     return TriangleMesh(mesh.vertices * (1, 1, 0.02), mesh.faces)
 
 
-def with_pieces(mesh: TriangleMesh, n_pieces: int = 12) -> TriangleMesh:
-    """The mesh with small closed pieces beside it, each a thirtieth of its size."""
-    piece = body(max(mesh.n_vertices // 100, 50))
-    places = 4 * np.random.default_rng(1).standard_normal((n_pieces, 3))
-    vertices = [mesh.vertices, *(piece.vertices / 8 + place for place in places)]
-    starts = mesh.n_vertices + piece.n_vertices * np.arange(n_pieces)
-    return TriangleMesh(np.concatenate(vertices), np.concatenate([mesh.faces, *(piece.faces + s for s in starts)]))
+def with_islands(mesh: TriangleMesh, n_islands: int = 12) -> TriangleMesh:
+    """The mesh with small closed islands beside it, each an eighth of its length."""
+    island = body(max(mesh.n_vertices // 100, 50))
+    places = 4 * np.random.default_rng(1).standard_normal((n_islands, 3))
+    vertices = [mesh.vertices, *(island.vertices / 8 + place for place in places)]
+    starts = mesh.n_vertices + island.n_vertices * np.arange(n_islands)
+    return TriangleMesh(np.concatenate(vertices), np.concatenate([mesh.faces, *(island.faces + s for s in starts)]))
 
 
 def _with_limbs(points: FloatArray) -> FloatArray:
@@ -73,7 +73,7 @@ def _with_limbs(points: FloatArray) -> FloatArray:
 
 
 def _posed(points: FloatArray, bend: float) -> FloatArray:
-    """Turn what is far from the middle about the z axis, more the further out it is."""
+    """Rotate points about the z axis, by an angle that grows with the distance from the middle."""
     turn = bend * np.maximum(np.linalg.norm(points, axis=1) - 1.2, 0) / 2
     x, y, z = points.T
     return np.stack([x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn), z], axis=1)

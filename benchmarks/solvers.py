@@ -1,6 +1,7 @@
-"""One eigensolver on one mesh in a process of its own: `python -m benchmarks.solvers METHOD MESH.npz RESULT.npz`.
+"""Time and memory of one eigensolver on one mesh: `python -m benchmarks.solvers METHOD MESH.npz RESULT.npz`.
 
-Each method goes from a mesh to its Wave Kernel Signature: 300 pairs, 100 energies, surface scaled to area 1.
+Each method computes the Wave Kernel Signature of a mesh: 300 eigenpairs, 100 energies, surface scaled to area 1.
+`benchmarks.speed` starts this command in a new process for each run.
 """
 
 from __future__ import annotations
@@ -22,21 +23,21 @@ METHODS = ("eigsh", "lapy", "fast", "exact")
 
 
 def solve(method: str, mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
-    """Eigenvalues and signature."""
+    """Eigenvalues and signature of a mesh by one of the methods."""
     if method == "fast":
-        # As the extension does it: of a large mesh the functions are never all in memory.
+        # As in the extension: the eigenfunctions of a large mesh are never all in memory.
         return np.zeros(0), wave_kernel_signature_of(mesh, N_PAIRS)
-    values, functions = {"eigsh": by_eigsh, "lapy": by_lapy, "exact": by_lanczos}[method](mesh)
+    values, functions = {"eigsh": by_eigsh, "lapy": by_lapy, "exact": by_exact_solver}[method](mesh)
     return values, wave_kernel_signature(values, functions)
 
 
-def by_lanczos(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
-    """Ours."""
+def by_exact_solver(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
+    """Eigenpairs by our exact solver."""
     return eigenpairs(mesh, N_PAIRS, "exact")
 
 
 def by_eigsh(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
-    """SciPy's shift-invert Lanczos, as pyFM and the examples of robust_laplacian call it."""
+    """Eigenpairs by SciPy's shift-invert Lanczos, called as in pyFM and the examples of robust_laplacian."""
     from scipy.sparse.linalg import eigsh
 
     values, functions = eigsh(stiffness_matrix(mesh), N_PAIRS, M=mass_matrix(mesh) / mesh.area, sigma=-0.01)
@@ -44,7 +45,7 @@ def by_eigsh(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
 
 
 def by_lapy(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
-    """LaPy with what pip installs: SciPy's shift-invert Lanczos on a factor of its own."""
+    """Eigenpairs by LaPy as pip installs it: SciPy's shift-invert Lanczos with SciPy's sparse factor."""
     from lapy import Solver, TriaMesh
 
     surface = TriaMesh(mesh.vertices / np.sqrt(mesh.area), mesh.faces)
@@ -53,14 +54,14 @@ def by_lapy(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
 
 
 def peak_memory() -> float:
-    """Most memory that this process has had so far, in MB; 0 where the system does not tell."""
+    """Largest resident memory of this process so far, in MB; 0 on systems without /proc."""
     status = Path("/proc/self/status")
-    found = re.search(r"VmHWM:\s+(\d+)", status.read_text()) if status.exists() else None
-    return int(found[1]) / 1000 if found else 0.0
+    match = re.search(r"VmHWM:\s+(\d+)", status.read_text()) if status.exists() else None
+    return int(match[1]) / 1000 if match else 0.0
 
 
 def main(method: str, source: str, target: str) -> None:
-    """Solve and save eigenvalues, signature, seconds and memory beyond what the mesh and the libraries take."""
+    """Solve; save eigenvalues, signature, seconds, and memory in addition to that of mesh and libraries."""
     with np.load(source) as arrays:
         mesh = TriangleMesh(arrays["vertices"], arrays["faces"])
     before = peak_memory()
@@ -69,7 +70,7 @@ def main(method: str, source: str, target: str) -> None:
     cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
     memory = peak_memory() - before
     if method == "fast":
-        values = eigenpair_panels(mesh, N_PAIRS)[0]  # once more, since the signature keeps them for itself
+        values = eigenpair_panels(mesh, N_PAIRS)[0]  # computed again, since the signature does not return them
     np.savez(target, values=values, signature=signature, cpu=cpu, wall=wall, memory=memory)
 
 

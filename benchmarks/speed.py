@@ -1,9 +1,9 @@
-"""How fast, how exact, how much memory: `python -m benchmarks.speed [--output docs/speed.md]`.
+"""Speed, accuracy and memory of eigensolvers, and duration of a job: `python -m benchmarks.speed [--output FILE.md]`.
 
-Every solver runs in a process of its own on one BLAS thread, in turn (A, B, C, A, B, C), on meshes that the command
-makes. Reference is `scipy.sparse.linalg.eigsh` in shift-invert mode, as other libraries call it; errors are measured
-against our exact solver. LaPy takes part where `pip install .[peers]` brought it. Then the whole job in Blender by
-stage, and the floor that no method can pass.
+Each solver runs in a new process on one BLAS thread, alternating with the others (A, B, C, A, B, C), on generated
+meshes. The reference is `scipy.sparse.linalg.eigsh` in shift-invert mode, as other libraries call it; errors are
+relative to our exact solver. LaPy is included if it is installed (`pip install .[peers]`). Then follow the stages of a
+job in Blender, and the time of the least work that each method must do.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ from wks_segment.core.learning.standardizer import SIGNATURE_OFFSET
 from wks_segment.core.mesh.triangle_mesh import FloatArray
 
 SEGMENTS = 8
-KINDS = ("even", "irregular", "border", "pieces", "thin")
-MOST_VERTICES = {"eigsh": 100_000, "lapy": 20_000, "exact": 1_000_000, "fast": 10_000_000}
-"""Above, a solver takes too long to wait for."""
+KINDS = ("even", "irregular", "border", "islands", "thin")
+MAX_VERTICES = {"eigsh": 100_000, "lapy": 20_000, "exact": 1_000_000, "fast": 10_000_000}
+"""Largest mesh of each solver; a larger one takes too long."""
 EVERY_KIND_UP_TO = 20_000
-"""Larger meshes are even or irregular, the largest even."""
+"""Size up to which all kinds of meshes are measured; larger meshes are even or irregular, the largest are even."""
 ROUNDS = 2
 HEADER = [
     "mesh", "vertices", "solver", "CPU s", "× eigsh", "wall s", "memory MB", "eigenvalue error max, median",
@@ -48,7 +48,7 @@ HEADER = [
 
 
 def main() -> None:
-    """Parse the command line and print all tables."""
+    """Print all tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sizes", type=int, nargs="+", default=[5_000, 20_000, 100_000, 250_000, 1_000_000])
     parser.add_argument("--kinds", nargs="+", default=list(KINDS), choices=KINDS)
@@ -75,8 +75,8 @@ def main() -> None:
     )
     for line in jobs():
         say(line)
-    say("\n## The floor\nWhat every method has to do at least, on the even mesh: seconds on one thread.\n")
-    for line in floors(options.sizes):
+    say("\n## Least work\nWhat each method must compute at least, on the even mesh: seconds on one thread.\n")
+    for line in least_work(options.sizes):
         say(line)
     if options.output:
         picture = options.output.parent / "images" / "speed.svg"
@@ -86,7 +86,7 @@ def main() -> None:
 
 
 def machine() -> str:
-    """What the figures were measured on."""
+    """Date, processor and versions of a measurement."""
     model = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
@@ -100,29 +100,29 @@ def machine() -> str:
 
 
 def table_row(cells: Sequence[str]) -> str:
-    """A line of a Markdown table."""
+    """Line of a Markdown table."""
     return "| " + " | ".join(cells) + " |"
 
 
 def kinds_of(size: int, kinds: Sequence[str]) -> list[str]:
-    """Kinds of mesh that are tried at a size."""
+    """Kinds of mesh that are measured at a size."""
     if size <= EVERY_KIND_UP_TO:
         return list(kinds)
     return [kind for kind in kinds if kind in (("even", "irregular") if size <= 100_000 else ("even",))]
 
 
 def make(kind: str, size: int) -> TriangleMesh:
-    """The mesh of a kind."""
-    mesh = shapes.body(round(size / shapes.LEFT) if kind == "border" else size, irregular=kind == "irregular")
-    changed: dict[str, Callable[[TriangleMesh], TriangleMesh]]
-    changed = {"border": shapes.with_border, "pieces": shapes.with_pieces, "thin": shapes.thinned}
-    return changed[kind](mesh) if kind in changed else mesh
+    """Mesh of a kind and approximate number of vertices."""
+    mesh = shapes.body(round(size / shapes.KEPT_SHARE) if kind == "border" else size, irregular=kind == "irregular")
+    changes: dict[str, Callable[[TriangleMesh], TriangleMesh]]
+    changes = {"border": shapes.with_border, "islands": shapes.with_islands, "thin": shapes.thinned}
+    return changes[kind](mesh) if kind in changes else mesh
 
 
 def compare(kind: str, mesh: TriangleMesh) -> Iterator[tuple[list[str], str, float]]:
-    """Run all solvers in turn; their rows of the table, names and CPU seconds."""
-    methods = [m for m in METHODS if mesh.n_vertices <= 1.2 * MOST_VERTICES[m]]
-    if kind != "even" or importlib.util.find_spec("lapy") is None:  # SciPy's solver on a factor of its own
+    """Run all solvers on a mesh; yield row of the table, name and CPU seconds of each."""
+    methods = [m for m in METHODS if mesh.n_vertices <= 1.2 * MAX_VERTICES[m]]
+    if kind != "even" or importlib.util.find_spec("lapy") is None:
         methods = [m for m in methods if m != "lapy"]
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "mesh.npz"
@@ -138,7 +138,7 @@ def compare(kind: str, mesh: TriangleMesh) -> Iterator[tuple[list[str], str, flo
     for method in methods:
         best = min(runs[method], key=lambda r: r["cpu"])
         pairs = zip(runs.get("eigsh", []), runs[method], strict=False)
-        times = [float(reference["cpu"] / mine["cpu"]) for reference, mine in pairs]
+        times = [float(reference["cpu"] / result["cpu"]) for reference, result in pairs]
         above = truth["values"] > 1e-6 * truth["values"][-1]
         error = np.abs(best["values"][above] / truth["values"][above] - 1)
         wks = np.linalg.norm(best["signature"] - truth["signature"]) / np.linalg.norm(truth["signature"])
@@ -151,7 +151,7 @@ def compare(kind: str, mesh: TriangleMesh) -> Iterator[tuple[list[str], str, flo
 
 
 def labeler(signature: FloatArray, areas: FloatArray) -> Callable[[FloatArray], Any]:
-    """A function from signatures to labels, by one mixture that is fitted on the true signature."""
+    """Function from signatures to labels, by one mixture that is fitted to the given signature."""
     step = max(1, len(signature) // 100_000)
     logs = np.log(signature[::step].astype(np.float64) + SIGNATURE_OFFSET)
     center, spread = logs.mean(axis=0), logs.std(axis=0)
@@ -160,7 +160,7 @@ def labeler(signature: FloatArray, areas: FloatArray) -> Callable[[FloatArray], 
 
 
 def run(method: str, source: Path, target: Path) -> dict[str, Any]:
-    """One measurement in a fresh process on one thread."""
+    """One measurement in a new process on one thread."""
     command = [sys.executable, "-m", "benchmarks.solvers", method, str(source), str(target)]
     subprocess.run(command, check=True, env={**os.environ, **threads(1)})
     with np.load(target) as result:
@@ -168,12 +168,12 @@ def run(method: str, source: Path, target: Path) -> dict[str, Any]:
 
 
 def threads(count: int) -> dict[str, str]:
-    """Environment that sets the threads of BLAS."""
+    """Environment with a number of BLAS threads."""
     return {"OMP_NUM_THREADS": str(count), "OPENBLAS_NUM_THREADS": str(count)}
 
 
 def jobs() -> Iterator[str]:
-    """The whole job on one core and on two, and where poses are solved side by side."""
+    """Table of the stages of a job, with one and with two poses at the same time."""
     header: list[str] = []
     for vertices, poses in ((10_000, 5), (100_000, 3)):
         for workers in (1, 2):
@@ -182,7 +182,7 @@ def jobs() -> Iterator[str]:
             done = subprocess.run(command, check=True, capture_output=True, text=True)
             stages = json.loads(done.stdout.splitlines()[-1])
             if not header:
-                header = ["vertices", "poses", "side by side", "all", *stages]
+                header = ["vertices", "poses", "at a time", "all", *stages]
                 yield table_row(header)
                 yield table_row(["---"] * len(header))
             whole = sum(stage["wall"] for stage in stages.values())
@@ -190,8 +190,8 @@ def jobs() -> Iterator[str]:
             yield table_row([f"{vertices:,}", str(poses), str(workers), f"{whole:.1f}", *cells])
 
 
-def floors(sizes: Sequence[int]) -> Iterator[str]:
-    """Time of the matrix, of one sparse product with all columns, and of one pass over the result."""
+def least_work(sizes: Sequence[int]) -> Iterator[str]:
+    """Table of the time of the matrix, of one sparse product with all columns, and of one pass over the result."""
     yield table_row(["vertices", "stiffness matrix", "one product S X", "one pass over X"])
     yield table_row(["---"] * 4)
     for size in sizes:
@@ -206,10 +206,10 @@ def floors(sizes: Sequence[int]) -> Iterator[str]:
         yield table_row([f"{size:,}", f"{assembly:.3f}", f"{product:.3f}", f"{sweep:.3f}"])
 
 
-def clocked(work: Callable[[Any], Any], argument: Any) -> float:
+def clocked(function: Callable[[Any], Any], argument: Any) -> float:
     """CPU seconds of a call."""
     start = time.process_time()
-    work(argument)
+    function(argument)
     return time.process_time() - start
 
 

@@ -1,8 +1,8 @@
-"""How long Blender's window would stand still while a job runs: `python -m benchmarks.stalls [--vertices 20000]`.
+"""Time for which Blender's window is blocked by a job: `python -m benchmarks.stalls [--vertices 20000]`.
 
-Learns in a thread, as the button does, while this thread does what Blender's does: it sleeps for a moment, and wants to
-go on. Prints one line of JSON: seconds of reading and writing, which are done in one go, the longest gaps in between
-with the stage and the call that the job was at, and the longest time from asking for the end to the end.
+Learns in a thread, as Learn and Segment does, while the main thread sleeps for short times, as Blender's does. Prints
+JSON: seconds of reading and writing, which block the window, seconds of each stage, and the longest delays of the main
+thread with the stage and the call that caused them.
 """
 
 from __future__ import annotations
@@ -24,13 +24,14 @@ from wks_segment.blender.workflow.background_job import BackgroundJob
 from wks_segment.blender.workflow.segmentation_job import SegmentationJob
 from wks_segment.core import MemoryCache
 
-MOMENT = 0.02
-"""Seconds between two looks."""
-SHOWN = 5
+SLEEP_SECONDS = 0.02
+"""Seconds that the main thread sleeps at a time."""
+N_GAPS = 5
+"""Number of the longest delays that are printed."""
 
 
 def main() -> None:
-    """Run once and print."""
+    """Run the job once and print the result."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--vertices", type=int, default=20_000)
     parser.add_argument("--poses", type=int, default=5)
@@ -63,46 +64,46 @@ def main() -> None:
 
 
 def run() -> dict[str, Any]:
-    """Learn, and measure."""
+    """Learn, and measure each phase."""
     begun = time.perf_counter()
-    work = SegmentationJob.learning(bpy.context, MemoryCache())
+    job = SegmentationJob.learning(bpy.context, MemoryCache())
     read = time.perf_counter() - begun
-    gaps, job = watched(work)
-    job.result()
+    gaps, background_job = watched(job)
+    background_job.result()
     begun = time.perf_counter()
-    work.write()
+    job.write()
     written = time.perf_counter() - begun
-    return {"read": read, "write": written, "stages": work.report.seconds, "longest": gaps}
+    return {"read": read, "write": written, "stages": job.report.seconds, "longest": gaps}
 
 
-def watched(work: SegmentationJob) -> tuple[list[dict[str, Any]], BackgroundJob]:
-    """The longest gaps between two looks while the work is computed, and the job."""
+def watched(job: SegmentationJob) -> tuple[list[dict[str, Any]], BackgroundJob]:
+    """The longest delays of this thread while a job runs, and the job."""
     gaps: list[dict[str, Any]] = []
-    job = BackgroundJob("Learn and Segment", work.compute, work.guard.glance)
+    running = BackgroundJob("Learn and Segment", job.compute, job.guard.glance)
     last, over = time.perf_counter(), False
     ticks: list[tuple[float, str, float]] = []
     while not over:
-        over = job.step()
-        time.sleep(MOMENT)
+        over = running.step()
+        time.sleep(SLEEP_SECONDS)
         now = time.perf_counter()
-        stage = job.stage
-        gaps.append({"seconds": now - last - MOMENT, "stage": stage, "share": job.share, "at": _places()})
+        stage = running.stage
+        gaps.append({"seconds": now - last - SLEEP_SECONDS, "stage": stage, "share": running.share, "at": _places()})
         last = now
         if not ticks or ticks[-1][1] != stage:
-            ticks.append((now, stage, job.share))
+            ticks.append((now, stage, running.share))
     print(*(f"{at - ticks[0][0]:7.2f} {share:.3f} {stage}" for at, stage, share in ticks), sep="\n", file=sys.stderr)
-    return sorted(gaps, key=lambda gap: -gap["seconds"])[:SHOWN], job
+    return sorted(gaps, key=lambda gap: -gap["seconds"])[:N_GAPS], running
 
 
 def _places() -> list[str]:
-    """What other threads are at: the innermost calls of our own."""
+    """Innermost call of this package in each other thread."""
     frames = {ident: frame for ident, frame in sys._current_frames().items() if ident != threading.get_ident()}
-    found = []
+    places = []
     for frame in frames.values():
         calls = [call for call in traceback.extract_stack(frame) if "wks_segment" in call.filename]
         if calls:
-            found.append(f"{os.path.basename(calls[-1].filename)}:{calls[-1].lineno} {calls[-1].line}")
-    return found
+            places.append(f"{os.path.basename(calls[-1].filename)}:{calls[-1].lineno} {calls[-1].line}")
+    return places
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
-"""How long labels take to follow a setting: `python -m benchmarks.tuning [--vertices 10000] [--poses 5] [FILE]`.
+"""Time until labels follow a change of settings: `python -m benchmarks.tuning [--vertices 10000] [--poses 5] [FILE]`.
 
-Learns a body in shape keys, or five frames of a character that Blender imports, and then changes settings as the
-sidebar does. Prints a Markdown table: CPU seconds, and wall seconds by stage. The first change of a kind finds out what
-later ones have.
+Learns a body with shape keys, or five frames of a character in a file, and then changes settings as the sidebar does.
+Prints a Markdown table: CPU seconds, and wall seconds of each stage. The first change of a kind computes intermediate
+results that later ones reuse.
 """
 
 from __future__ import annotations
@@ -45,11 +45,11 @@ CHANGES: list[tuple[str, dict[str, Any]]] = [
     ("… smoothness 1", {"smoothness": 1.0}),
     ("soft vertex groups", {"vertex_groups": "soft"}),
 ]
-COLUMNS = ("all, CPU", "all", "regroup", "read", "posteriors", "clean-up", "sides", "write")
+STAGE_COLUMNS = ("all, CPU", "all", "regroup", "read", "posteriors", "clean-up", "sides", "write")
 
 
 class Clock:
-    """Seconds by stage; of one inside another only the outer one counts."""
+    """Seconds of each stage; time in a stage within another one counts only for the outer one."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = defaultdict(float)
@@ -57,7 +57,7 @@ class Clock:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
-        """Add the time of a block."""
+        """Add the duration of a block to a stage."""
         if self._inside:
             yield
             return
@@ -66,8 +66,8 @@ class Clock:
         self.seconds[name] += time.perf_counter() - start
         self._inside = False
 
-    def wrapped(self, owner: Any, name: str, stage: str) -> None:
-        """Let a function count as a stage."""
+    def wrap(self, owner: Any, name: str, stage: str) -> None:
+        """Replace a function of a class by one whose duration counts as a stage."""
         function: Callable[..., Any] = getattr(owner, name)
 
         def timed(*arguments: Any, **options: Any) -> Any:
@@ -78,7 +78,7 @@ class Clock:
 
 
 def main() -> None:
-    """Run once and print."""
+    """Learn once and measure all changes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("file", type=Path, nargs="?")
     parser.add_argument("--vertices", type=int, default=10_000)
@@ -106,7 +106,7 @@ def main() -> None:
 
 
 def keyed_body(n_vertices: int, n_poses: int) -> None:
-    """An object of the scene with a pose in each shape key."""
+    """Add an object with a pose in each shape key."""
     bodies = [shapes.body(n_vertices, bend=0.2 * i) for i in range(n_poses)]
     mesh = bpy.data.meshes.new("Body")
     mesh.from_pydata(bodies[0].vertices, [], bodies[0].faces)
@@ -120,7 +120,7 @@ def keyed_body(n_vertices: int, n_poses: int) -> None:
 
 
 def run(n_poses: int) -> None:
-    """Learn, change and print."""
+    """Learn, change settings and print the table."""
     scene, session = bpy.context.scene, session_of(bpy.context)
     settings = scene.wks_segment
     settings.live, settings.pose_count = False, n_poses
@@ -130,11 +130,11 @@ def run(n_poses: int) -> None:
     assert session.job is not None
     print(f"\nLearned in {took:.1f} seconds: {', '.join(session.job.report.facts[:2])}.\n")
     clock = Clock()
-    clock.wrapped(PolygonMesh, "mean", "posteriors")
-    clock.wrapped(PolygonMesh, "labels", "clean-up")
-    clock.wrapped(PoseSegmentation, "polygon_sides", "sides")
-    print(table_row(["change", *COLUMNS]))
-    print(table_row(["---"] * (1 + len(COLUMNS))))
+    clock.wrap(PolygonMesh, "mean", "posteriors")
+    clock.wrap(PolygonMesh, "labels", "clean-up")
+    clock.wrap(PoseSegmentation, "polygon_sides", "sides")
+    print(table_row(["change", *STAGE_COLUMNS]))
+    print(table_row(["---"] * (1 + len(STAGE_COLUMNS))))
     for name, change in CHANGES:
         for setting, value in change.items():
             setattr(settings, setting, value)
@@ -143,7 +143,7 @@ def run(n_poses: int) -> None:
         work = session.update(scene)
         whole = {"all, CPU": time.process_time() - cpu, "all": time.perf_counter() - start}
         seconds = {**work.report.seconds, **clock.seconds, **whole}
-        print(table_row([name, *(f"{seconds.get(column, 0.0):.2f}" for column in COLUMNS)]), flush=True)
+        print(table_row([name, *(f"{seconds.get(column, 0.0):.2f}" for column in STAGE_COLUMNS)]), flush=True)
 
 
 if __name__ == "__main__":

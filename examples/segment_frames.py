@@ -2,9 +2,9 @@
 
     blender --background --python-exit-code 1 --python examples/segment_frames.py -- walk.glb labeled.blend
 
-SciPy and scikit-learn come with the extension, or with `pip install -e .` where `bpy` is a Python module. What the
-operators do in one call is written out here, so that you can change any step: other poses, another model, another use
-of the labels. Takes the largest mesh of the file.
+The same as the operators do in one call is written out here, so that you can change each step: other poses, another
+model, another use of the labels. Needs the installed extension, or `pip install -e .` in a Python with the bpy module.
+The largest mesh of the file is used.
 """
 
 import importlib
@@ -19,16 +19,16 @@ FRAMES = (1, 8, 15, 22, 29)
 SEGMENTS = 6
 
 
-def wks_segment(part: str) -> Any:
-    """A part of the package, from the installed extension or from the Python environment."""
-    for name in sys.modules:
-        if name.startswith("bl_ext.") and name.endswith(".wks_segment.wks_segment"):
-            return importlib.import_module(f"{name}.{part}")
-    return importlib.import_module(f"wks_segment.{part}")
+def import_from_package(name: str) -> Any:
+    """Import a module of the package, from the installed extension or from the Python environment."""
+    for package in sys.modules:
+        if package.startswith("bl_ext.") and package.endswith(".wks_segment.wks_segment"):
+            return importlib.import_module(f"{package}.{name}")
+    return importlib.import_module(f"wks_segment.{name}")
 
 
 def triangles_of(obj: bpy.types.Object) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Vertices, triangles and the polygon of each triangle, as the object is seen in this frame."""
+    """Vertices, triangles and the polygon of each triangle of an object with its modifiers in the current frame."""
     evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh = evaluated.to_mesh()
     mesh.calc_loop_triangles()
@@ -40,8 +40,8 @@ def triangles_of(obj: bpy.types.Object) -> tuple[NDArray[Any], NDArray[Any], NDA
 
 
 def main(source: str, target: str) -> None:
-    """Read, learn, label, write, save."""
-    core, labels = wks_segment("core"), wks_segment("blender.labels")
+    """Learn segments from the animation in a file, label its largest mesh and save the scene."""
+    core, outputs = import_from_package("core"), import_from_package("blender.outputs.labels")
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.import_scene.gltf(filepath=source)
     obj = max((o for o in bpy.data.objects if o.type == "MESH"), key=lambda o: len(o.data.vertices))
@@ -54,15 +54,17 @@ def main(source: str, target: str) -> None:
         polygons.append(polygon_of)
 
     model = core.PoseSegmentation(n_segments=SEGMENTS)
-    described = [model.describe(pose) for pose in poses]  # eigenpairs and signatures: what takes the time
+    described = [
+        model.describe(pose) for pose in poses
+    ]  # computes eigenpairs and signatures, which takes most of the time
     model.fit(described)
-    component = model.segment_polygons(described, polygons)
+    labels = model.segment_polygons(described, polygons)
 
-    labels.write_labels(obj.data, component, colors=True)
+    outputs.write_labels(obj.data, labels)  # attributes and colors
     model.save(f"{target}.model.json")
     bpy.ops.wm.save_as_mainfile(filepath=target)
     for k in range(SEGMENTS):
-        print(f"segment {k}: {np.mean(component == k):.0%} of the faces")
+        print(f"segment {k}: {np.mean(labels == k):.0%} of the faces")
 
 
 if __name__ == "__main__":

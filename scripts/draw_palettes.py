@@ -1,4 +1,7 @@
-"""Draws the palettes to choose from, as people with and without all cones see them: docs/images/palettes.png."""
+"""Draw the palettes as people with normal color vision and with color blindness see them.
+
+python -m scripts.draw_palettes [FILE]   # default: docs/images/palettes.png
+"""
 
 from __future__ import annotations
 
@@ -11,25 +14,25 @@ from PIL import Image, ImageDraw
 from wks_segment.blender.parts.palette import BLINDNESS, RECIPES, linear, sided_palette
 from wks_segment.core.mesh.triangle_mesh import FloatArray
 
-COLORS = 16
+N_COLORS = 16
 CELL, GAP, LEFT = 44, 26, 150
-"""Width of a color, space above a palette, and space for names, in pixels."""
+"""Size of a color, space above a palette, and space for names, in pixels."""
 EYES = {"all cones": np.eye(3), **dict(zip(("without red", "without green", "without blue"), BLINDNESS, strict=True))}
 TEXT = (40, 40, 40)
 
 
 def main(path: Path) -> None:
-    """Write the picture."""
+    """Draw all palettes to a file."""
     height = len(RECIPES) * (GAP + len(EYES) * CELL)
-    picture = Image.new("RGB", (LEFT + COLORS * CELL, height), "white")
+    picture = Image.new("RGB", (LEFT + N_COLORS * CELL, height), "white")
     draw = ImageDraw.Draw(picture)
     for i, (name, recipe) in enumerate(RECIPES.items()):
         top = i * (GAP + len(EYES) * CELL)
         draw.text((4, top + 8), recipe.title, TEXT, font_size=14)
-        middle, left, right = sided_palette(name)[:, :COLORS]
-        for row, (who, eyes) in enumerate(EYES.items()):
+        middle, left, right = sided_palette(name)[:, :N_COLORS]
+        for row, (vision, eyes) in enumerate(EYES.items()):
             y = top + GAP + row * CELL
-            draw.text((16, y + CELL // 2 - 8), who, TEXT, font_size=12)
+            draw.text((16, y + CELL // 2 - 8), vision, TEXT, font_size=12)
             for column, (whole, light, dark) in enumerate(
                 zip(*(_bytes(colors, eyes) for colors in (middle, left, right)), strict=True)
             ):
@@ -41,7 +44,7 @@ def main(path: Path) -> None:
 
 
 def _bytes(srgb: FloatArray, eyes: FloatArray) -> list[list[int]]:
-    """(n, 3) sRGB colors as somebody sees them, in 8 bits."""
+    """(n, 3) sRGB colors in 8 bits, as seen by eyes that a (3, 3) matrix on linear RGB describes."""
     light = np.clip(linear(srgb) @ eyes.T, 0, 1)
     seen = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
     rounded: list[list[int]] = np.rint(255 * seen).astype(int).tolist()

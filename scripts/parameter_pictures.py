@@ -1,9 +1,9 @@
-"""The pictures of docs/parameters.md, made by the software itself: what each setting does to the same pose.
+"""Render the pictures of docs/parameters.md: one pose with different values of a setting.
 
-    python -m scripts.parameter_pictures                         # all of them, into docs/images; some minutes
-    python -m scripts.parameter_pictures smoothness loose_parts  # these
+    python -m scripts.parameter_pictures                         # all, to docs/images; takes some minutes
+    python -m scripts.parameter_pictures smoothness loose_parts  # only these
 
-Learns through the operators, as an artist does. Needs bpy and Pillow (`make` installs both into .venv).
+Learns with the operators, as an artist does. Needs bpy and Pillow (`make` installs both in .venv).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from mathutils import Matrix, Vector
 from PIL import Image
 
 import wks_segment.blender
-from wks_segment.blender.cli import demo_scene
+from wks_segment.blender.cli.demo_scene import creature_in
 from wks_segment.blender.outputs.part_attributes import FACE_ATTRIBUTE
 from wks_segment.blender.render.contact_sheet import Tile, render_poses
 from wks_segment.blender.scene import poses
@@ -30,29 +30,29 @@ from wks_segment.blender.scene.characters import Character
 from wks_segment.core.mesh.triangle_mesh import IntArray
 
 FOLDER = Path(__file__).resolve().parent.parent / "docs" / "images"
-WIDTH = 340
-"""Of a tile, in pixels."""
-SHADES = 256
-"""Different colors in a picture: enough for the eye, and a tenth of the bytes."""
-LEARNED_BY = ("n_segments", "n_eigenpairs", "preset", "pieces")
-"""Settings that another model is learned for; the others act when a model is applied."""
+TILE_WIDTH = 340
+"""Width of a tile, in pixels."""
+N_COLORS = 256
+"""Number of colors in a picture; the eye sees no difference, and the file has a tenth of the bytes."""
+MODEL_SETTINGS = ("n_segments", "n_eigenpairs", "preset", "pieces")
+"""Settings that need a new model; the others take effect when a model is applied."""
 FRAME = 8
-"""The frame of the creature that is shown."""
+"""Frame of the creature in the pictures."""
 BEND = 0.6
-"""How far the robot bends its limbs in its second pose, in radians."""
+"""Angle by which the robot bends its limbs in its second pose, in radians."""
 Place = tuple[float, float, float]
 
 
 class Sheet(NamedTuple):
-    """Tiles side by side: what is written below each, and its settings."""
+    """Tiles side by side: caption and settings of each."""
 
     character: Callable[[], Character]
     tiles: dict[str, dict[str, Any]]
 
 
 def creature() -> Character:
-    """The creature of the demo."""
-    character = demo_scene.creature(bpy.context)
+    """Build the creature of the demo."""
+    character = creature_in(bpy.context.scene)
     settings = bpy.context.scene.wks_segment
     settings.source, settings.pose_count = "FRAMES", 4
     bpy.context.scene.frame_set(FRAME)
@@ -60,8 +60,8 @@ def creature() -> Character:
 
 
 def robot() -> Character:
-    """A robot of blocks that touch nowhere, whose eight parts of limbs are one and the same block."""
-    blocks: list[tuple[Place, Place, Place | None]] = [  # middle, size, joint of what bends
+    """Build a robot of separate blocks, with two equal blocks in each limb."""
+    blocks: list[tuple[Place, Place, Place | None]] = [  # middle, size, joint about which it is bent
         ((0.0, 0.0, 1.35), (0.56, 0.34, 0.7), None),
         ((0.0, 0.0, 1.92), (0.34, 0.34, 0.34), None),
     ]
@@ -117,9 +117,9 @@ SHEETS = {
 
 
 def main() -> None:
-    """Make the pictures that are asked for."""
+    """Render the pictures that the options ask for."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(SHEETS)}; none: all")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"pictures, by default all: {', '.join(SHEETS)}")
     parser.add_argument("--folder", type=Path, default=FOLDER)
     options = parser.parse_args()
     if unknown := set(options.names) - set(SHEETS):
@@ -132,7 +132,7 @@ def main() -> None:
 
 
 def draw(sheet: Sheet, path: Path, models: dict[Any, str]) -> None:
-    """Learn what is not among the models yet, apply, and write the picture."""
+    """Render a sheet to a file; models that are learned for it are added to `models`."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     character = sheet.character()
     for obj in character.objects:
@@ -140,35 +140,35 @@ def draw(sheet: Sheet, path: Path, models: dict[Any, str]) -> None:
         bpy.context.view_layer.objects.active = obj
     (pose,) = poses.read_objects(bpy.context, [character])
     tiles = [
-        Tile(pose, labeled(character, changes, (sheet.character, models)), text)
-        for text, changes in sheet.tiles.items()
+        Tile(pose, labeled(character, changes, (sheet.character, models)), caption)
+        for caption, changes in sheet.tiles.items()
     ]
     render_poses(tiles, path)
     with Image.open(path) as picture:
-        small = picture.convert("RGB").resize((WIDTH * len(tiles), WIDTH), Image.Resampling.LANCZOS)
-    few = small.quantize(SHADES, Image.Quantize.FASTOCTREE, kmeans=2, dither=Image.Dither.NONE)
-    few.save(path, optimize=True)
+        small = picture.convert("RGB").resize((TILE_WIDTH * len(tiles), TILE_WIDTH), Image.Resampling.LANCZOS)
+    reduced = small.quantize(N_COLORS, Image.Quantize.FASTOCTREE, kmeans=2, dither=Image.Dither.NONE)
+    reduced.save(path, optimize=True)
 
 
 def labeled(character: Character, changes: dict[str, Any], known: tuple[Any, dict[Any, str]]) -> IntArray:
-    """(p,) part of each polygon by the default settings with these changes."""
+    """(p,) part of each polygon, with the default settings except for some changes."""
     settings, (kind, models) = bpy.context.scene.wks_segment, known
-    for name in {name for sheet in SHEETS.values() for of in sheet.tiles.values() for name in of}:
+    for name in {name for sheet in SHEETS.values() for values in sheet.tiles.values() for name in values}:
         settings.property_unset(name)
     for name, value in changes.items():
         setattr(settings, name, value)
-    key = (kind, *(getattr(settings, name) for name in LEARNED_BY))
+    key = (kind, *(getattr(settings, name) for name in MODEL_SETTINGS))
     if key not in models:
         bpy.ops.wks_segment.learn()
         models[key] = settings.model
     settings.model = models[key]
     bpy.ops.wks_segment.apply()
-    found = []
+    parts = []
     for obj in character.objects:
         labels = np.empty(len(obj.data.polygons), dtype=np.int32)
         obj.data.attributes[FACE_ATTRIBUTE].data.foreach_get("value", labels)
-        found.append(labels.astype(np.int64))
-    return np.concatenate(found)
+        parts.append(labels.astype(np.int64))
+    return np.concatenate(parts)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""Makes the pictures of the docs that show Blender's window: `make screenshots`, into `docs/images`.
+"""Take the screenshots of the docs that show Blender's window, to `docs/images`: `make screenshots`.
 
-Opens a real Blender with the extension as it is now, and does with mouse and keyboard what the docs tell.
-`tests/window` says how, and what it needs; WKS_SEGMENT_WINDOW names the folder where Blender is or gets installed.
+Opens a real Blender with the current extension, and follows the steps of the docs with mouse and keyboard. Blender is
+taken from the folder that WKS_SEGMENT_WINDOW names, or installed there; `tests/window` says what that needs.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from tests.window.driver import SUITES, RealBlender, build_zip
 IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
 BODY = "Creature"
 SUBPANELS = {"outputs": "write_materials", "models": "wks_segment.save_model", "advanced": "snap_to"}
-"""What to look for in them."""
-BELOW = 70
-"""Pixels that are shown below the last button: titles of closed sub-panels."""
+"""Sub-panel to one of its buttons."""
+MARGIN_BELOW = 70
+"""Pixels below the last button, which show the titles of closed sub-panels."""
 
 
 def main() -> None:
-    """Take all pictures."""
+    """Take all screenshots."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--blender", choices=SUITES, default="5.2")
     parser.add_argument("--output", type=Path, default=IMAGES)
@@ -36,7 +36,7 @@ def main() -> None:
 
 
 def take(blender: RealBlender, folder: Path) -> None:
-    """The way of the first minute, a picture at each stop."""
+    """Go through the first steps of an artist, with a screenshot of each."""
     blender.select(BODY)
     blender.open_sidebar()
     blender.over_viewport()
@@ -45,8 +45,8 @@ def take(blender: RealBlender, folder: Path) -> None:
     blender.wait_for("segments", BODY)
     blender.over_viewport()
     viewport(blender, folder / "panel.png")
-    for name, inside in SUBPANELS.items():
-        blender.find(inside)  # opens its sub-panel
+    for name, button in SUBPANELS.items():
+        blender.find(button)  # opens its sub-panel
         panel(blender, folder / f"panel_{name}.png")
 
 
@@ -58,11 +58,11 @@ def viewport(blender: RealBlender, path: Path) -> None:
 
 
 def panel(blender: RealBlender, path: Path) -> None:
-    """Save the side panel down to where it ends."""
+    """Save the side panel down to its last button."""
     x, y, width, height = blender.ask("region", "UI")
     last = max(place[1] for place in blender.ask("button", "none of these").values())
     blender.over_viewport()
-    blender.screenshot(path, (x, y, width, min(height, last - y + BELOW)))
+    blender.screenshot(path, (x, y, width, min(height, last - y + MARGIN_BELOW)))
 
 
 if __name__ == "__main__":

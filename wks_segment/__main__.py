@@ -1,4 +1,4 @@
-"""`python -m wks_segment`: the command line without a Blender program, on the bpy module."""
+"""`python -m wks_segment`: the command line in Python with the bpy module, without the Blender program."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ def main() -> None:
         import bpy  # noqa: F401
     except ImportError:
         sys.exit(
-            "wks_segment: this command needs Blender's Python module: pip install bpy, or blender --command wks_segment"
+            "wks_segment: this command needs Blender as a Python module (pip install bpy); or use Blender: "
+            "blender --command wks_segment"
         )
     from . import blender
     from .blender.cli.main import run

@@ -1,4 +1,4 @@
-"""The window tests run only when they are asked for: `make test-window`. See README.md."""
+"""Fixtures of the window tests, which run only by `make test-window`; see README.md."""
 
 import os
 import re
@@ -10,17 +10,17 @@ from driver import HERE, SUITES, RealBlender, build_zip
 
 ROOT = HERE.parents[1]
 FOLDER = os.environ.get("WKS_SEGMENT_WINDOW")
-"""Where the Blenders are, or get installed."""
+"""Folder in which the Blenders are, or are installed."""
 PICTURES = ROOT / "window" / "screenshots"
 
 
 def pytest_addoption(parser):
-    parser.addoption("--blender", action="append", choices=SUITES, help="the window tests: with this one only")
+    parser.addoption("--blender", action="append", choices=SUITES, help="run the window tests only with this Blender")
 
 
 def pytest_generate_tests(metafunc):
     if "blender" in metafunc.fixturenames:
-        # Where the folder was not named on the command line, neither is its option.
+        # The option exists only if this folder is named on the command line.
         versions = metafunc.config.getoption("blender", default=None) or list(SUITES)
         metafunc.parametrize("blender", versions, indirect=True, scope="session")
 
@@ -32,7 +32,7 @@ def extension_zip(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def blender(request):
-    """A real Blender with the extension, and a creature to work on."""
+    """A real Blender with the extension, and a file with the creature."""
     if FOLDER is None:
         pytest.skip("needs root, a Debian mirror and 2 GB for a real Blender: make test-window")
     with RealBlender(request.param, Path(FOLDER)) as blender:
@@ -42,12 +42,12 @@ def blender(request):
 
 
 UNTOUCHED, SCENE = "untouched.blend", "creature.blend"
-"""The scene as it was made, and the one that a test opens, and may save."""
+"""The scene as it was made, and the copy that a test opens and may save."""
 
 
 @pytest.fixture
 def window(blender):
-    """Blender's window with the creature before it."""
+    """Blender's window with the creature in view."""
     blender.clicks = 0
     shutil.copyfile(blender.shared / UNTOUCHED, blender.shared / SCENE)
     blender.start(f"/window/{SCENE}")
@@ -58,7 +58,7 @@ def window(blender):
 
 @pytest.fixture
 def shot(blender, request):
-    """A function that keeps a picture of the window, numbered in the order of the steps."""
+    """A function that saves a screenshot of the window, numbered in the order of the steps."""
     test = request.node.name.removeprefix("test_").replace(blender.version, "")
     folder = PICTURES / blender.version / re.sub(r"\W+", "_", test).strip("_")
     taken = []
@@ -74,20 +74,20 @@ def shot(blender, request):
 
 @pytest.fixture(autouse=True)
 def quiet(request):
-    """No test leaves a warning or an error on the terminal."""
+    """Fail a test that leaves a warning or an error on the terminal."""
     yield
     if "window" in request.fixturenames:
         assert complaints(request.getfixturevalue("blender").log()) == []
 
 
-EXPECTED = ("list of mounted file-systems",)
-"""What Blender says in a chroot whatever happens."""
+EXPECTED_LINES = ("list of mounted file-systems",)
+"""Lines that Blender always prints in a chroot."""
 
 
 def complaints(log):
-    """Lines that tell of something wrong."""
+    """Lines of a log that report a problem."""
     signs = ("warning", "error", "traceback", "exception", "not found", "unknown")
     return [
         line for line in log.splitlines() if any(sign in line.lower() for sign in signs)
-        and not any(known in line for known in EXPECTED)
+        and not any(known in line for known in EXPECTED_LINES)
     ]  # fmt: skip

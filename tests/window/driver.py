@@ -1,8 +1,8 @@
-"""Installs, starts and drives a real Blender in its own window, with mouse and keyboard. Standard library only.
+"""Install, start and control a real Blender with a window, by mouse and keyboard. Uses only the standard library.
 
-Each Blender lives in a Debian folder of its own (a chroot that `install.sh` makes) and draws, in software, on a screen
-of its own. `inside.py` runs in it: it says where buttons are and what the data is. Everything else is done
-by events that the window system sends, so that what is tested is what a person gets.
+Each Blender is in its own Debian folder (a chroot, made by `install.sh`) and renders in software to its own virtual
+screen. `inside.py` runs in Blender, and tells where buttons are and what the data is. Everything else is done by events
+of the window system, so that the tests see the same as a user.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from typing import Any
 
 HERE = Path(__file__).resolve().parent
 SUITES = {"5.2": "sid", "4.3": "trixie"}
-"""Which Debian has which Blender."""
+"""Version of Blender to the Debian suite that has it."""
 WIDTH, HEIGHT = 1280, 1400
-"""Size of the screen: high enough for the whole side panel."""
+"""Size of the screen, high enough for the whole side panel."""
 MOUNTS = (
     ("proc", ["-t", "proc", "proc"]),
     ("sys", ["--bind", "/sys"]),
@@ -29,18 +29,18 @@ MOUNTS = (
     ("dev/pts", ["--bind", "/dev/pts"]),
     ("dev/shm", ["-t", "tmpfs", "tmpfs"]),
 )
-HEADER = 26
-"""Height of the header of a sub-panel."""
-ROW = 21
-"""Height of a row in a list."""
-FIRST_FIELD, FIELD = 45, 23
-"""Where the first field of the last operator is, below its top, and how far the next."""
-PATIENCE = 600
-"""Seconds after which Blender is taken to hang."""
+HEADER_HEIGHT = 26
+"""Height of the header of a sub-panel, in pixels."""
+ROW_HEIGHT = 21
+"""Height of a row in a list, in pixels."""
+FIRST_FIELD, FIELD_HEIGHT = 45, 23
+"""Distance of the first field of the panel of the last operator from its top, and of each next field, in pixels."""
+TIMEOUT = 600
+"""Seconds after which Blender counts as hanging."""
 
 
 def build_zip(folder: Path) -> Path:
-    """The extension as it is now, for the Pythons that Debian's Blenders have."""
+    """Build the current extension for the Pythons of Debian's Blenders; path of the ZIP."""
     script = HERE.parents[1] / "scripts" / "build_zip.py"
     command = [sys.executable, str(script), "--platform", "linux-x64", "--python", "3.13", "3.14"]
     subprocess.run([*command, "--output", str(folder)], check=True, stdout=subprocess.DEVNULL)
@@ -48,20 +48,20 @@ def build_zip(folder: Path) -> Path:
 
 
 class WindowError(Exception):
-    """Blender did not do what it was asked to, with the end of its log."""
+    """Blender did not do what it was asked to; the message ends with the last lines of its log."""
 
 
 class RealBlender:
-    """A Blender with a window. Use it in a `with` block: what was started and mounted is taken down at its end."""
+    """A Blender with a window. At the end of a `with` block, its processes are ended and its folders unmounted."""
 
     def __init__(self, version: str, folder: Path, display: int = 91) -> None:
         self.version = version
         self.root = folder.resolve() / f"blender{version.replace('.', '')}"
         self.shared = self.root / "window"
-        """The folder that both sides see; /window for those inside."""
+        """Folder that Blender sees as /window."""
         self.display = display
         self.clicks = 0
-        """Clicks and drags since the start: what a way costs."""
+        """Number of clicks and drags since the start."""
         self._running: list[subprocess.Popen[bytes]] = []
         self._mounted: list[Path] = []
         self._asked = 0
@@ -83,10 +83,10 @@ class RealBlender:
             subprocess.run(["umount", target], check=True)
         self._mounted.clear()
 
-    # What is started.
+    # Programs.
 
     def command(self, *arguments: str | Path) -> str:
-        """Run Blender without a window to its end; what it printed. The user's settings are those of the window."""
+        """Run Blender without a window, with the same user settings; return its output."""
         inside = self._inside("blender", *arguments)
         done = subprocess.run(inside, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
         if done.returncode:
@@ -94,32 +94,32 @@ class RealBlender:
         return done.stdout
 
     def install_extension(self, path: Path) -> None:
-        """Install and enable a zip, as *Install from Disk* does."""
+        """Install and enable a ZIP, as *Install from Disk* does."""
         self.command(
             "--command", "extension", "install-file", "--repo", "user_default", "--enable", self.bring(path)
         )  # fmt: skip
 
-    def make_scene(self, what: str, name: str) -> str:
-        """Make a scene with `make_scene.py`; where it is. Other files that it needs are brought before."""
+    def make_scene(self, content: str, name: str) -> str:
+        """Make a scene with `make_scene.py`; return its path inside."""
         path = f"/window/{name}"
         self.command("--background", "--python-exit-code", "1", "--python", self.bring(HERE / "make_scene.py"),
-                     "--", what, path)  # fmt: skip
+                     "--", content, path)  # fmt: skip
         return path
 
     def bring(self, path: Path) -> str:
-        """Copy a file to where Blender can see it; its name there."""
+        """Copy a file to the shared folder; return its path inside."""
         shutil.copyfile(path, self.shared / path.name)
         return f"/window/{path.name}"
 
     def start(self, *arguments: str, beautiful: bool = False) -> None:
-        """Open the window, with a file if its name is given, and wait until it draws; beautiful is slow."""
+        """Open the window, with a file if its name is given, and wait until it is drawn; `beautiful` is slow."""
         self.bring(HERE / "inside.py")
         if beautiful:
             (self.shared / "beautiful").touch()
         for name in ("answer", "question"):
             (self.shared / name).unlink(missing_ok=True)
         screen = f"{WIDTH}x{HEIGHT}x24"
-        self._run_along("Xvfb", f":{self.display}", "-screen", "0", screen, "+extension", "GLX", "-nolisten", "tcp")
+        self._start("Xvfb", f":{self.display}", "-screen", "0", screen, "+extension", "GLX", "-nolisten", "tcp")
         socket = self.root / f"tmp/.X11-unix/X{self.display}"
         deadline = time.monotonic() + 30
         while not socket.exists():
@@ -127,14 +127,14 @@ class RealBlender:
                 raise WindowError(f"Xvfb does not start\n{self.log('Xvfb')}")
             time.sleep(0.1)
         geometry = ("0", "0", str(WIDTH), str(HEIGHT))
-        self._run_along("blender", "--window-geometry", *geometry, *arguments, "--python", "/window/inside.py")
+        self._start("blender", "--window-geometry", *geometry, *arguments, "--python", "/window/inside.py")
         self.ask("ready")
 
     def stop(self) -> None:
         """Close the window without saving."""
         for process in reversed(self._running):
             if process.poll() is None:
-                os.killpg(process.pid, signal.SIGTERM)  # a group of its own, see _run_along
+                os.killpg(process.pid, signal.SIGTERM)  # a group of its own, see _start
             try:
                 process.wait(10)
             except subprocess.TimeoutExpired:
@@ -145,26 +145,26 @@ class RealBlender:
         (self.root / f"tmp/.X11-unix/X{self.display}").unlink(missing_ok=True)
 
     def log(self, program: str = "blender") -> str:
-        """What a program has printed since it was started."""
+        """Output of a program since its start."""
         path = self.shared / f"{program}.log"
         return path.read_text(errors="replace") if path.exists() else ""
 
     # Mouse, keyboard, screen.
 
     def move(self, x: int, y: int) -> None:
-        """Move the mouse there, the way a hand does: Blender wants to see it come."""
+        """Move the mouse to a point in two steps: Blender ignores a mouse that only jumps."""
         self._xdotool("mousemove", x - 3, y - 2, "sleep", "0.05", "mousemove", x, y)
         self.settle()
 
     def click(self, x: int, y: int, button: int = 1, repeat: int = 1) -> None:
-        """Click there; button 4 and 5 are the wheel."""
+        """Click at a point; buttons 4 and 5 are the wheel."""
         self.move(x, y)
         self._xdotool("click", "--repeat", repeat, "--delay", "60", button)
         self.clicks += button < 4
         self.settle()
 
     def drag(self, x: int, y: int, to_x: int, to_y: int, button: int = 1) -> None:
-        """Press there and let go elsewhere; slowly, since a busy Blender takes a quick one for a click."""
+        """Drag from one point to another, slowly: a busy Blender takes a quick drag for a click."""
         self.move(x, y)
         middle = ((x + to_x) // 2, (y + to_y) // 2)
         for step in (("mousedown", button), ("mousemove", *middle), ("mousemove", to_x, to_y), ("mouseup", button)):
@@ -173,35 +173,35 @@ class RealBlender:
         self.clicks += 1
 
     def key(self, *names: str) -> None:
-        """Press keys one after the other, as `ctrl+z`; where the mouse is decides what they do."""
+        """Press keys one after the other, such as `ctrl+z`; they act on the region under the mouse."""
         for name in names:
             self._xdotool("key", name)
             self.settle()
 
     def type(self, text: str) -> None:
-        """Type a text."""
+        """Type text."""
         self._xdotool("type", "--delay", "40", text)
         self.settle()
 
     def screenshot(self, path: Path, box: tuple[int, int, int, int] | None = None) -> None:
-        """Save what a person would see, or a box of it (x, y, width, height)."""
+        """Save the screen, or a box of it (x, y, width, height), to a file."""
         path.parent.mkdir(parents=True, exist_ok=True)
         cut = [] if box is None else ["--autoselect", ",".join(map(str, box))]
-        # Blender's own screenshot is black where it draws in software.
+        # Blender's own screenshots are black when it renders in software.
         self._check(self._inside("scrot", "--overwrite", *cut, "/window/screen.png"))
         shutil.copyfile(self.shared / "screen.png", path)
 
-    # What is inside.
+    # Questions to `inside.py`.
 
-    def ask(self, question: str, *arguments: Any, patience: float = PATIENCE) -> Any:
-        """The answer of a function of `inside.py`; WindowError if it failed or Blender is gone."""
+    def ask(self, question: str, *arguments: Any, timeout: float = TIMEOUT) -> Any:
+        """Result of a function of `inside.py`; WindowError if it failed or Blender has ended."""
         self._asked += 1
         answer = self.shared / "answer"
         answer.unlink(missing_ok=True)
         draft = self.shared / "draft"
         draft.write_text(json.dumps([self._asked, question, arguments]))
         draft.rename(self.shared / "question")
-        deadline = time.monotonic() + patience
+        deadline = time.monotonic() + timeout
         while not answer.exists():
             gone = any(process.poll() is not None for process in self._running)
             if gone or time.monotonic() > deadline:
@@ -215,19 +215,19 @@ class RealBlender:
         return value
 
     def settle(self) -> None:
-        """Wait until events are dealt with and the window is drawn."""
+        """Wait until all events are handled and the window is drawn."""
         self.ask("settle")
 
-    def wait_for(self, question: str, *arguments: Any, patience: float = PATIENCE) -> Any:
-        """Ask until the answer is true; it."""
-        deadline = time.monotonic() + patience
+    def wait_for(self, question: str, *arguments: Any, timeout: float = TIMEOUT) -> Any:
+        """Ask until the answer is true; return it."""
+        deadline = time.monotonic() + timeout
         while not (value := self.ask(question, *arguments)):
             if time.monotonic() > deadline:
                 raise WindowError(f"{question}{tuple(arguments)} stays {value!r}\n{self.log()[-3000:]}")
             time.sleep(0.1)
         return value
 
-    # What a person does without thinking.
+    # Steps of a user.
 
     def select(self, name: str) -> None:
         """Click on an object in the viewport."""
@@ -238,76 +238,76 @@ class RealBlender:
         if not self.ask("tab"):
             self.over_viewport()
             self.key("n")
-            self.wait_for("tab", patience=10)
+            self.wait_for("tab", timeout=10)
         x, y, width, height = self.ask("region", "UI")
         clicks = self.clicks
         for down in range(20, height, 25):
             if self.ask("tab") == tab:
-                self.clicks = clicks + (down > 20)  # a person sees where it is
+                self.clicks = clicks + (down > 20)  # a user sees the tab and clicks once
                 return
             self.click(x + width - 12, y + down)
         raise WindowError(f"the side panel has no tab {tab}")
 
     def find(self, name: str) -> tuple[int, int]:
-        """Where the button of an operator or property is in the side panel; its sub-panel is opened if need be."""
-        found = self.ask("button", name)
-        if isinstance(found, list):
-            return found[0], found[1]
-        # Sub-panels come below the last button. A click on a header opens one, another closes it.
-        x, last = max(found.values(), key=lambda place: place[1])
+        """Position of the button of an operator or property in the side panel; its sub-panel is opened if necessary."""
+        buttons = self.ask("button", name)
+        if isinstance(buttons, list):
+            return buttons[0], buttons[1]
+        # Sub-panels follow the last button. A click on a header opens the panel, another click closes it.
+        x, last = max(buttons.values(), key=lambda place: place[1])
         clicks = self.clicks
-        for header in range(last + HEADER, last + 8 * HEADER, HEADER):
+        for header in range(last + HEADER_HEIGHT, last + 8 * HEADER_HEIGHT, HEADER_HEIGHT):
             self.click(x, header)
             opened = self.ask("button", name)
             if isinstance(opened, list):
-                self.clicks = clicks + 1  # a person reads the title
+                self.clicks = clicks + 1  # a user reads the title and clicks once
                 return opened[0], opened[1]
-            if opened.keys() != found.keys():
+            if opened.keys() != buttons.keys():
                 self.click(x, header)
-        raise WindowError(f"the side panel has no {name}: {', '.join(sorted(found))}")
+        raise WindowError(f"the side panel has no {name}: {', '.join(sorted(buttons))}")
 
     def press(self, name: str) -> None:
         """Click on a button of the side panel."""
         self.click(*self.find(name))
 
     def enter(self, name: str, text: str) -> None:
-        """Give a field of the side panel a value: double click, type, Enter."""
+        """Set a field of the side panel: double click, type, Enter."""
         self.click(*self.find(name), repeat=2)
         self.key("ctrl+a")
         self.type(text)
         self.key("Return")
 
     def adjust(self, field: int, text: str) -> None:
-        """Give a field below the viewport, where the last operator is adjusted, a value; it is opened if need be.
+        """Set a field of the panel that adjusts the last operator, in the viewport; it is opened if necessary.
 
-        Fields are counted from 0: of what is there Blender tells nothing.
+        Fields are counted from 0, since Blender does not tell which fields there are.
         """
         x, y, width, height = self.ask("region", "HUD")
-        if height < 2 * HEADER:
+        if height < 2 * HEADER_HEIGHT:
             self.click(x + width // 2, y + height // 2)
             x, y, width, height = self.ask("region", "HUD")
-        self.click(x + int(0.7 * width), y + FIRST_FIELD + FIELD * field, repeat=2)
+        self.click(x + int(0.7 * width), y + FIRST_FIELD + FIELD_HEIGHT * field, repeat=2)
         self.key("ctrl+a")
         self.type(text)
         self.key("Return")
 
     def row(self, index: int) -> tuple[int, int]:
-        """Where the name of a segment in the list is."""
+        """Position of the name of a segment in the list."""
         x, y = self.find("active_segment")
-        return x, y + ROW * index
+        return x, y + ROW_HEIGHT * index
 
     def choose(self, name: str, letter: str) -> None:
-        """Open a menu of the side panel and press the letter that is underlined in an item."""
+        """Open a menu of the side panel and press the underlined letter of an item."""
         self.press(name)
         self.key(letter)
-        self.clicks += 1  # a person clicks
+        self.clicks += 1  # a user clicks on the item
 
     def over_viewport(self) -> None:
-        """Move the mouse to where keys mean the viewport."""
+        """Move the mouse over the viewport, so that keys act on it."""
         x, y, width, height = self.ask("region", "WINDOW")
-        self.move(x + width // 2, y + height - 40)  # beside the last operator
+        self.move(x + width // 2, y + height - 40)  # not over the panel of the last operator
 
-    def _run_along(self, *command: str) -> None:
+    def _start(self, *command: str) -> None:
         with open(self.shared / f"{command[0]}.log", "wb") as log:
             self._running.append(
                 subprocess.Popen(self._inside(*command), stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
@@ -327,10 +327,10 @@ class RealBlender:
             "LIBGL_ALWAYS_SOFTWARE": "1",
             "HOME": "/window",
             "XDG_RUNTIME_DIR": "/tmp",
-            "BLENDER_USER_RESOURCES": "/window/user",  # a new user's
+            "BLENDER_USER_RESOURCES": "/window/user",  # a new user
             "PYTHONUNBUFFERED": "1",
             "PATH": "/usr/bin:/bin",
         }
-        # Lines as LANG=… are arguments of env.
+        # env takes the variables as arguments.
         variables = [f"{name}={value}" for name, value in environment.items()]
         return ["chroot", str(self.root), "env", "-i", *variables, *map(str, command)]

@@ -1,7 +1,8 @@
-"""What runs inside the Blender of the window tests: answers questions, presses nothing.
+"""Answer questions about Blender's window and data; runs inside the Blender of the window tests.
 
-Blender runs this at its start. The driver names a function of this file and its arguments in a file, and gets what it
-returns; a function that yields goes on after the next redraw. Positions are those of the screen, from its top left.
+Blender runs this file at its start. The driver writes the name of a function and its arguments to a file, and reads the
+result from another one. A function that yields is continued after the next redraw. Positions are in pixels from the top
+left of the screen.
 """
 
 import itertools
@@ -20,22 +21,22 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Euler, Vector
 
 FOLDER = "/window/"
-TICK = 0.04
-"""Seconds between looks at the question."""
-STEP = 9
-"""Pixels between places that `button` looks at: half a button's height."""
-COLUMNS = (0.62, 0.4, 0.85, 0.2)
-"""Where across a panel it looks: in fields and wide buttons, in both halves of a row, in the first third of one."""
+TIMER_SECONDS = 0.04
+"""Time between two checks for a question."""
+PROBE_STEP = 9
+"""Vertical distance of the points that `button` probes: half the height of a button."""
+PROBE_COLUMNS = (0.62, 0.4, 0.85, 0.2)
+"""Horizontal positions that it probes, relative to the width: fields and wide buttons, halves and thirds of rows."""
 
 
 def ready():
-    """Whether the window draws."""
+    """Whether the window is drawn."""
     yield from settle()
     return True
 
 
 def settle():
-    """Let events and redraws happen."""
+    """Wait for events and redraws."""
     for _ in range(2):
         _view3d().tag_redraw()
         yield
@@ -53,28 +54,29 @@ def tab():
 
 
 def button(name, kind="UI"):
-    """[x, y] of the button of an operator or property in a region; if it is not there, what is.
+    """[x, y] of the button of an operator or property in a region; if there is none, positions of all others by name.
 
-    The mouse goes down a column, then the next, and Blender says what its own Ctrl-C would copy there.
+    The mouse is moved down one column after the other. At each point Blender tells what Ctrl-C would copy there.
     """
     left, top, width, height = region(kind)
     found = {}
-    for across in COLUMNS:
+    for across in PROBE_COLUMNS:
         x = int(left + across * width)
-        for y in range(top + STEP, top + height, STEP):
+        for y in range(top + PROBE_STEP, top + height, PROBE_STEP):
             _window().cursor_warp(x, _window().height - y)
             yield
             here = _hovered(kind)
             if here == name:
-                return [x, y + STEP // 3]
+                return [x, y + PROBE_STEP // 3]
             found[here] = [x, y]
-            if here == "" and y > STEP * 26 + max((place[1] for key, place in found.items() if key), default=top + 400):
+            last = max((place[1] for key, place in found.items() if key), default=top + 400)
+            if here == "" and y > last + 26 * PROBE_STEP:
                 break  # below the last panel
     return {key: place for key, place in found.items() if key}
 
 
 def place_of(name):
-    """[x, y] on the screen of the vertex of an object that is nearest to the eye: a click there takes the object."""
+    """[x, y] of the vertex of an object that is nearest to the viewer; a click there selects the object."""
     area, space = _region("WINDOW"), _view3d().spaces.active.region_3d
     obj = bpy.data.objects[name]
     points = [obj.matrix_world @ vertex.co for vertex in obj.evaluated_get(_depsgraph()).data.vertices]
@@ -84,19 +86,19 @@ def place_of(name):
 
 
 def view():
-    """Where the eye is, as numbers."""
+    """Numbers of the view matrix."""
     return [value for row in _view3d().spaces.active.region_3d.view_matrix for value in row]
 
 
 def zoom_to_all(azimuth=-60.0, height=75.0):
-    """A view of all, from the side: a starting point, not a step of the way."""
+    """View everything from the side, as the start of a test."""
     area = _view3d()
     area.spaces.active.region_3d.view_rotation = Euler((radians(height), 0, radians(azimuth))).to_quaternion()
     yield from settle()
     with bpy.context.temp_override(window=_window(), area=area, region=_region("WINDOW")):
         bpy.ops.view3d.view_all()
     yield from settle()
-    # To the left, out of the way of the side panel.
+    # Move it to the left, so that the side panel does not cover it.
     eye = area.spaces.active.region_3d
     eye.view_location += eye.view_rotation @ Vector((0.13 * eye.view_distance, 0, 0))
     eye.view_distance *= 1.15
@@ -104,7 +106,7 @@ def zoom_to_all(azimuth=-60.0, height=75.0):
 
 
 def state():
-    """What the user works with: mode, selection, settings, file."""
+    """Selection, settings, model and file."""
     scene, layer = _window().scene, _window().view_layer
     settings = scene.wks_segment
     return {
@@ -125,7 +127,7 @@ def state():
 
 
 def segments(name):
-    """{part: number of faces} of an object; empty without segments."""
+    """{part: number of faces} of an object; empty if it has no segments."""
     mesh = bpy.data.objects[name].data
     if "wks_segment" not in mesh.attributes:
         return {}
@@ -137,7 +139,7 @@ def rows():
     """The list of segments: [name, share, hidden, number of selected faces] of each."""
     mesh = _window().view_layer.objects.active.data
     chosen = []
-    if mesh.is_editmode:  # what the mesh itself holds is that of before
+    if mesh.is_editmode:  # the mesh itself has the state before Edit Mode
         faces = bmesh.from_edit_mesh(mesh).faces
         part = faces.layers.int["wks_segment"]
         chosen = [face[part] for face in faces if face.select]
@@ -147,12 +149,12 @@ def rows():
 
 
 def face_sets(name):
-    """How many face sets an object has."""
+    """Number of face sets of an object."""
     return len(np.unique(_values(bpy.data.objects[name].data, ".sculpt_face_set")))
 
 
 def image_colors(name):
-    """How many pixels of an image have each color, as "r g b a" in bytes."""
+    """Number of pixels of each color of an image; a color is "r g b a" in bytes."""
     image = bpy.data.images.get(name)
     if image is None:
         return {}
@@ -168,40 +170,40 @@ def objects():
 
 
 def make_active(name):
-    """Make an object the active one: what lies inside another cannot be clicked."""
+    """Make an object active that cannot be clicked, since it lies inside another one."""
     _window().view_layer.objects.active = bpy.data.objects[name]
     yield from settle()
 
 
 def job_runs():
-    """Whether there is something to cancel."""
+    """Whether a job is running."""
     with bpy.context.temp_override(window=_window(), area=_view3d()):
         return bpy.ops.wks_segment.cancel.poll()
 
 
 def job_is_over():
-    """Whether there is nothing to cancel."""
+    """Whether no job is running."""
     return not job_runs()
 
 
 def n_segments(name, count):
-    """Whether an object has that many segments."""
+    """Whether an object has a number of segments."""
     return len(segments(name)) == count
 
 
 def groups(name, beginning):
-    """Names of an object's vertex groups that begin so."""
+    """Names of the vertex groups of an object with a common beginning."""
     return [group.name for group in bpy.data.objects[name].vertex_groups if group.name.startswith(beginning)]
 
 
 def contents(name):
-    """A fingerprint of each thing that an artist could miss of an object: attributes, slots, groups, weights."""
+    """Hash or value of everything of an object that a user could lose: attributes, slots, groups, weights."""
     obj = bpy.data.objects[name]
     mesh = obj.data
     found = {
-        f"attribute {each.name}": [each.domain, each.data_type, _fingerprint(each)]
+        f"attribute {each.name}": [each.domain, each.data_type, _hash_values(each)]
         for each in mesh.attributes
-        if not each.name.startswith(".")  # of its own ones Blender gives some a wrong type
+        if not each.name.startswith(".")  # Blender gives some of its own ones a wrong type
     }
     found |= {f"vertex group {group.name}": group.index for group in obj.vertex_groups}
     weights = [[(each.group, each.weight) for each in vertex.groups] for vertex in mesh.vertices]
@@ -216,7 +218,7 @@ def contents(name):
 
 
 def watch_redraws():
-    """Begin to note when the viewport is drawn; it is asked to, all the time."""
+    """Redraw the viewport all the time, and record the time of each redraw."""
     bpy.app.driver_namespace["redraws"] = times = []
     draw = bpy.types.SpaceView3D.draw_handler_add(lambda: times.append(time.perf_counter()), (), "WINDOW", "POST_PIXEL")
 
@@ -225,19 +227,19 @@ def watch_redraws():
             bpy.types.SpaceView3D.draw_handler_remove(draw, "WINDOW")
             return None
         _view3d().tag_redraw()
-        return TICK
+        return TIMER_SECONDS
 
     bpy.app.timers.register(again)
 
 
 def redraws():
-    """Seconds between redraws since `watch_redraws`, and the end of it."""
+    """Seconds between redraws since `watch_redraws`, which is ended."""
     times = bpy.app.driver_namespace.pop("redraws")
     return [after - before for before, after in itertools.pairwise(times)]
 
 
 def _values(mesh, name):
-    """Numbers of an attribute of faces; zeros where there is none."""
+    """Values of an attribute of faces; zeros if there is none."""
     values = np.zeros(len(mesh.polygons), dtype=np.int32)
     attribute = mesh.attributes.get(name)
     if attribute is not None:
@@ -245,7 +247,7 @@ def _values(mesh, name):
     return values
 
 
-def _fingerprint(attribute):
+def _hash_values(attribute):
     prop, width = {
         "FLOAT_VECTOR": ("vector", 3), "FLOAT2": ("vector", 2), "BYTE_COLOR": ("color", 4), "FLOAT_COLOR": ("color", 4),
     }.get(attribute.data_type, ("value", 1))  # fmt: skip
@@ -255,7 +257,7 @@ def _fingerprint(attribute):
 
 
 def _hovered(kind):
-    """The operator or property under the mouse, as `wks_segment.learn` or `n_segments`; "" if there is none."""
+    """Operator or property under the mouse, such as `wks_segment.learn` or `n_segments`; "" if there is none."""
     manager = bpy.context.window_manager
     with bpy.context.temp_override(window=_window(), area=_view3d(), region=_region(kind)):
         if bpy.ops.ui.copy_python_command_button.poll():
@@ -287,14 +289,14 @@ def _answer(number, failed, value):
     os.rename(FOLDER + "draft_answer", FOLDER + "answer")
 
 
-class Desk:
-    """Takes a question at a time and works on it, a step a tick."""
+class Responder:
+    """Answers one question at a time, one step of it at each call of the timer."""
 
     def __init__(self):
         self.number, self.steps = 0, None
 
-    def tick(self):
-        """Called by a timer."""
+    def advance(self):
+        """Read a question, or continue with the current one; called by a timer."""
         try:
             if self.steps is None and os.path.exists(FOLDER + "question"):
                 with open(FOLDER + "question") as file:
@@ -313,11 +315,11 @@ class Desk:
         except Exception:
             self.steps = None
             _answer(self.number, True, traceback.format_exc())
-        return TICK
+        return TIMER_SECONDS
 
 
 if __name__ == "__main__":
     bpy.context.preferences.view.show_splash = False
     if not os.path.exists(FOLDER + "beautiful"):  # without a graphics card each redraw would take half a second
         bpy.context.preferences.system.viewport_aa = "OFF"
-    bpy.app.timers.register(Desk().tick, first_interval=1.0, persistent=True)
+    bpy.app.timers.register(Responder().advance, first_interval=1.0, persistent=True)

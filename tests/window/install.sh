@@ -1,23 +1,23 @@
 #!/usr/bin/env bash
-# Installs a real Blender with a window system into a Debian folder of its own (a chroot), once.
+# Installs a real Blender with a window system in a new Debian folder (a chroot).
 #   install.sh SUITE FOLDER      trixie: Blender 4.3, Python 3.13 · sid: Blender 5.2, Python 3.14
-# About three minutes and 2.2 GB. Needs root, debootstrap and a Debian mirror. Where it is done, it does nothing.
+# Takes three minutes and 2.2 GB; does nothing if it is installed already. Needs root, debootstrap and a Debian mirror.
 set -euo pipefail
 suite=${1:?suite} folder=${2:?folder}
 mirror=${DEBIAN_MIRROR:-http://deb.debian.org/debian}
 done_mark=$folder/.installed
 
 if [ -e "$done_mark" ] || { [ -x "$folder/usr/bin/blender" ] && [ -x "$folder/usr/bin/Xvfb" ]; }; then exit 0; fi
-[ "$(id -u)" = 0 ] || { echo "root is needed to install into a folder of its own" >&2; exit 1; }
+[ "$(id -u)" = 0 ] || { echo "root is needed to make a chroot" >&2; exit 1; }
 command -v debootstrap >/dev/null || { apt-get update -qq && apt-get install -y -qq --no-install-recommends debootstrap; }
 
-echo "installing Blender from Debian $suite into $folder (three minutes, 2.2 GB)"
+echo "installing Blender from Debian $suite in $folder (three minutes, 2.2 GB)"
 [ -x "$folder/usr/bin/apt-get" ] || debootstrap --variant=minbase "$suite" "$folder" "$mirror" >/dev/null
-# Services must not start in there.
+# Services must not start in the chroot.
 printf '#!/bin/sh\nexit 101\n' > "$folder/usr/sbin/policy-rc.d"
 chmod +x "$folder/usr/sbin/policy-rc.d"
 cp /etc/resolv.conf "$folder/etc/resolv.conf"
-# A mirror's index of sid can be older than its own validity date.
+# The index of sid on a mirror can be past its own validity date.
 echo 'Acquire::Check-Valid-Until "false";' > "$folder/etc/apt/apt.conf.d/99window-tests"
 
 mount -t proc proc "$folder/proc"

@@ -1,7 +1,7 @@
-"""Makes a scene to work in: `blender --background --python make_scene.py -- creature|BODIES.npz OUT.blend`.
+"""Make a scene for a test: `blender --background --python make_scene.py -- creature|BODIES.npz OUT.blend`.
 
-`creature`: the extension's own walking creature, as an artist would open it. A .npz: a mesh object for each of its
-pairs of arrays `vertices_0`, `faces_0`, …, all of them selected.
+`creature` is the walking creature of the demo. A .npz file has arrays `vertices_0`, `faces_0`, …, for each of which the
+scene gets a selected mesh object.
 """
 
 import importlib
@@ -14,18 +14,18 @@ ADDON = "bl_ext.user_default.wks_segment"
 
 
 def creature():
-    """The creature in the middle of the view; its bones are hidden, as riggers do."""
+    """Build the creature, with its armature hidden."""
     scene = bpy.context.scene
-    maker = importlib.import_module(f"{ADDON}.wks_segment.blender.cli.creature")
-    scene.frame_start, scene.frame_end = maker.FIRST_FRAME, maker.LAST_FRAME
-    body = maker.build_creature(scene)
+    builder = importlib.import_module(f"{ADDON}.wks_segment.blender.cli.creature")
+    scene.frame_start, scene.frame_end = builder.FIRST_FRAME, builder.LAST_FRAME
+    body = builder.build_creature(scene)
     body.parent.hide_set(True)
     for obj in bpy.context.view_layer.objects:
         obj.select_set(False)
 
 
 def bodies(path):
-    """Poses side by side, all selected."""
+    """Add the bodies of a file side by side, all selected."""
     with np.load(path) as arrays:
         for i in range(len(arrays.files) // 2):
             mesh = bpy.data.meshes.new(f"Pose {i + 1}")
@@ -38,11 +38,11 @@ def bodies(path):
     bpy.context.scene.wks_segment.source = "OBJECTS"
 
 
-what, out = sys.argv[sys.argv.index("--") + 1 :]
+content, out = sys.argv[sys.argv.index("--") + 1 :]
 for name in ("Cube", "Camera", "Light"):
     bpy.data.objects.remove(bpy.data.objects[name])
-if what == "creature":
+if content == "creature":
     creature()
 else:
-    bodies(what)
+    bodies(content)
 bpy.ops.wm.save_as_mainfile(filepath=out)

@@ -1,20 +1,20 @@
-"""What an artist does with segments: the list, tuning, outputs, the way from the zip to a baked ID map."""
+"""Work of an artist with segments: the list, adjusting, outputs, and the way from the ZIP to a baked ID map."""
 
 import pytest
 
 BODY = "Creature"
-FEWEST_CLICKS = 12
-"""Clicks from the zip to a baked ID map, at most."""
+MAX_CLICKS = 12
+"""Largest number of clicks from the ZIP to a baked ID map."""
 
-NOTHING = "0 0 0 255"
+EMPTY_COLOR = "0 0 0 255"
 """Color of pixels that no face covers."""
 SEGMENTS, SMOOTHNESS = 0, 3
-"""Fields of Learn and Segment where it is adjusted."""
+"""Indices of fields in the panel that adjusts Learn and Segment."""
 
 
 @pytest.fixture
 def learned(window):
-    """The window with segments of two poses."""
+    """The window after learning from two poses."""
     window.select(BODY)
     window.open_sidebar()
     window.enter("pose_count", "2")
@@ -24,7 +24,7 @@ def learned(window):
     return window
 
 
-def test_the_list_renames_hides_merges_splits_and_takes_faces_by_hand(learned, shot):
+def test_segments_are_renamed_hidden_split_selected_and_assigned_in_the_list(learned, shot):
     names = [row[0] for row in learned.ask("rows")]
     assert names == [f"Segment {i}" for i in range(1, 9)]
     rename(learned, 1, "Torso")
@@ -109,7 +109,7 @@ def test_a_preview_writes_nothing_until_it_is_accepted(learned, shot):
 
 
 def test_from_the_zip_to_a_baked_id_map(window, shot):
-    # The zip is installed in three clicks (Install from Disk, the file, the button), which Blender's own window takes.
+    # Installing the ZIP takes three clicks in Blender's own windows (Install from Disk, the file, the button).
     clicks = window.clicks + 3
     window.select(BODY)
     window.open_sidebar()
@@ -120,9 +120,9 @@ def test_from_the_zip_to_a_baked_id_map(window, shot):
     window.press("wks_segment.bake")
     colors = window.wait_for("image_colors", f"{BODY} ID Map")
     shot("baked")
-    assert clicks + window.clicks <= FEWEST_CLICKS
-    # Flat colors of eight segments and black where there is none, not a mixed one among them.
-    assert colors.pop(NOTHING) > 0
+    assert clicks + window.clicks <= MAX_CLICKS
+    # Only the flat colors of eight segments, and black: no mixed colors.
+    assert colors.pop(EMPTY_COLOR) > 0
     assert 2 <= len(colors) <= 8
 
 
@@ -135,17 +135,17 @@ def test_outputs_are_written_and_undone(learned, shot):
     assert learned.ask("contents", BODY)["seams"] > before["seams"]
     assert learned.ask("face_sets", BODY) == 8
     shot("seams and face sets")
-    for press, wrote in {
+    for button, is_written in {
         "wks_segment.unwrap": lambda now: len(now["uv layers"]) > len(before["uv layers"]),
         "wks_segment.separate": lambda now: len(now["objects"]) > len(before["objects"]),
     }.items():
         last = learned.ask("contents", BODY)
-        learned.press(press)
-        assert wrote(learned.ask("contents", BODY)), press
-        shot(press.rpartition(".")[2])
+        learned.press(button)
+        assert is_written(learned.ask("contents", BODY)), button
+        shot(button.rpartition(".")[2])
         learned.over_viewport()
         learned.key("ctrl+z")
-        assert learned.ask("contents", BODY) == last, press
+        assert learned.ask("contents", BODY) == last, button
     learned.press("wks_segment.clear")
     cleared = learned.ask("contents", BODY)
     assert cleared["seams"] == 0
@@ -154,7 +154,7 @@ def test_outputs_are_written_and_undone(learned, shot):
 
 
 def test_an_outfit_takes_the_segments_of_the_body(learned, shot):
-    """A copy without segments, moved aside and back, is the simplest outfit."""
+    """A copy of the body without segments serves as the outfit."""
     learned.over_viewport()
     learned.key("shift+d", "Escape")
     copy = next(name for name in learned.ask("objects") if name.startswith(f"{BODY}."))

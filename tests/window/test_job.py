@@ -1,4 +1,4 @@
-"""Work that does not block the window: progress, orbiting, canceling, and what ends a job by itself."""
+"""A job that runs in the background: progress, orbiting meanwhile, canceling, and changes that end it."""
 
 import pytest
 
@@ -11,7 +11,7 @@ def learning(window):
     window.select(BODY)
     window.open_sidebar()
     window.press("wks_segment.learn")
-    window.wait_for("job_runs", patience=20)
+    window.wait_for("job_runs", timeout=20)
     return window
 
 
@@ -20,7 +20,7 @@ def test_progress_is_shown_and_the_view_stays_orbitable(learning, shot):
     before = learning.ask("view")
     x, y, width, height = learning.ask("region", "WINDOW")
     learning.drag(x + width // 3, y + height - 60, x + width // 3 + 150, y + height - 90, button=2)
-    assert learning.ask("job_runs"), "too quick to tell"
+    assert learning.ask("job_runs"), "the job ended before the view could be moved"
     assert learning.ask("view") != before
     shot("orbited meanwhile")
     learning.wait_for("job_is_over")
@@ -29,16 +29,16 @@ def test_progress_is_shown_and_the_view_stays_orbitable(learning, shot):
     shot("learned")
 
 
-@pytest.mark.parametrize("how", ["escape", "button"])
-def test_canceling_writes_nothing_and_one_can_learn_again(learning, shot, how):
+@pytest.mark.parametrize("means", ["escape", "button"])
+def test_canceling_writes_nothing_and_one_can_learn_again(learning, shot, means):
     before = learning.ask("contents", BODY)
-    if how == "escape":
+    if means == "escape":
         learning.over_viewport()
         learning.key("Escape")
     else:
         learning.press("wks_segment.cancel")
-    learning.wait_for("job_is_over", patience=30)
-    shot(f"canceled by {how}")
+    learning.wait_for("job_is_over", timeout=30)
+    shot(f"canceled by {means}")
     assert learning.ask("contents", BODY) == before
     assert not learning.ask("state")["model"]
     learning.enter("pose_count", "2")
@@ -51,7 +51,7 @@ def test_deleting_the_object_ends_the_job(learning, shot):
     learning.over_viewport()
     learning.key("x")
     learning.key("Return")
-    learning.wait_for("job_is_over", patience=30)
+    learning.wait_for("job_is_over", timeout=30)
     learning.settle()
     shot("deleted")
     assert not learning.ask("state")["model"]
@@ -60,7 +60,7 @@ def test_deleting_the_object_ends_the_job(learning, shot):
 def test_editing_the_mesh_ends_the_job(learning, shot):
     learning.over_viewport()
     learning.key("Tab", "a", "x", "v")
-    learning.wait_for("job_is_over", patience=30)
+    learning.wait_for("job_is_over", timeout=30)
     learning.key("Tab")
     shot("edited")
     assert learning.ask("segments", BODY) == {}
@@ -72,7 +72,7 @@ def test_leaving_the_file_ends_the_job(learning, shot):
     learning.settle()
     shot("asked to save")
     learning.key("d")  # Don't Save
-    learning.wait_for("job_is_over", patience=30)
+    learning.wait_for("job_is_over", timeout=30)
     learning.settle()
     shot("new file")
     assert learning.ask("state")["file"] == ""

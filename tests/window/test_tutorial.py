@@ -1,4 +1,4 @@
-"""What the tutorial says, done with mouse and keyboard in a real window; each step checked on the data."""
+"""The steps of the tutorial, with mouse and keyboard in a real window; each step is checked on the data."""
 
 BODY = "Creature"
 
@@ -66,7 +66,7 @@ def test_tutorial(window, shot):
     shot("applied from the model in the file")
 
 
-def test_an_output_at_a_time_is_undone_to_the_byte(window, shot):
+def test_each_output_is_undone_to_the_byte(window, shot):
     window.select(BODY)
     window.open_sidebar()
     window.enter("pose_count", "2")
@@ -92,7 +92,7 @@ def test_an_output_at_a_time_is_undone_to_the_byte(window, shot):
         while contents_and_settings(window) != before:
             window.key("ctrl+z")
             undone += 1
-            assert undone <= 4, step  # the setting, what follows from it, Apply
+            assert undone <= 4, step  # the setting, its consequences, Apply
         window.key(*["ctrl+shift+z"] * undone)
         assert contents_and_settings(window) == written, step
 
@@ -102,7 +102,7 @@ def contents_and_settings(window):
 
 
 def undo_until(window, contents, at_most=20):
-    """Press Ctrl-Z over the viewport until the object is as it was; how often that was."""
+    """Press Ctrl-Z over the viewport until the object is as before; return how often."""
     window.over_viewport()
     for pressed in range(at_most):
         if window.ask("contents", BODY) == contents:

@@ -1,4 +1,4 @@
-"""The code blocks of docs/recipes.md run as they stand there, one after the other, and print what stands below them."""
+"""The code blocks of docs/recipes.md run in their order, and print the text that follows them on the page."""
 
 import os
 import re
@@ -20,7 +20,7 @@ BENDS = (0.0, 0.3, 0.6)
 
 
 class Recipe(NamedTuple):
-    """A code block, and what it prints; None: nobody says."""
+    """A code block, and the output that the page shows for it, if any."""
 
     language: str
     code: str
@@ -35,15 +35,15 @@ def recipes():
         yield pytest.param(recipe, id=re.sub(r"\W+", "_", title.lower()))
 
 
-def test_no_block_of_the_page_is_left_out():
+def test_all_blocks_of_the_page_are_found():
     page = PAGE.read_text(encoding="utf-8")
     assert len(list(recipes())) == len(re.findall(r"^```(?!text)\w+$", page, re.MULTILINE)) > 0
 
 
 @pytest.fixture(scope="module")
-def kitchen(extension, tmp_path_factory):
-    """A folder with the files that the page speaks of, and a `python` that is this one."""
-    folder = tmp_path_factory.mktemp("kitchen")
+def recipe_folder(extension, tmp_path_factory):
+    """Folder with the files that the page mentions, and this Python as `python`."""
+    folder = tmp_path_factory.mktemp("recipes")
     (folder / "characters").mkdir()
     (folder / "bin").mkdir()
     python = folder / "bin" / "python"
@@ -65,11 +65,11 @@ def kitchen(extension, tmp_path_factory):
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="the recipes are for a Unix shell")
 @pytest.mark.parametrize("recipe", recipes())
-def test_recipe(recipe, kitchen, needs_rendering):
+def test_recipe(recipe, recipe_folder, needs_rendering):
     shell = ["bash", "-e", "-o", "pipefail", "-c"] if recipe.language == "sh" else [sys.executable, "-c"]
-    paths = {"PATH": f"{kitchen / 'bin'}{os.pathsep}{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
+    paths = {"PATH": f"{recipe_folder / 'bin'}{os.pathsep}{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
-        [*shell, recipe.code], cwd=kitchen, env=os.environ | paths, capture_output=True, text=True, timeout=300
+        [*shell, recipe.code], cwd=recipe_folder, env=os.environ | paths, capture_output=True, text=True, timeout=300
     )
     assert done.returncode == 0, done.stderr
     if recipe.printed is not None:

@@ -1,4 +1,4 @@
-"""The picture of poses side by side."""
+"""Contact sheets: colors of parts, arrangement, and removal of temporary data."""
 
 import bpy
 import numpy as np
@@ -8,13 +8,13 @@ from builders import changes, limbed_poses, scene_snapshot
 from wks_segment.blender.errors import UserError
 from wks_segment.blender.parts.palette import palette
 from wks_segment.blender.parts.part_style import Style
-from wks_segment.blender.render.contact_sheet import TILE, Tile, render_poses
+from wks_segment.blender.render.contact_sheet import TILE_PIXELS, Tile, render_poses
 from wks_segment.blender.scene import poses as reader
 from wks_segment.blender.scene.poses import Character
 
 pytestmark = pytest.mark.usefixtures("scene", "needs_rendering")
-SHOWN = (0, 3, 7)
-"""Components in the picture."""
+PARTS = (0, 3, 7)
+"""Parts in the picture."""
 
 
 def tiles(count):
@@ -25,12 +25,12 @@ def tiles(count):
     result = []
     for pose in poses:
         height = pose.mesh.vertices[pose.mesh.faces].mean(axis=1)[:, 2]
-        result.append(Tile(pose, np.array(SHOWN)[np.digitize(height, (-0.4, 0.3))], pose.name))
+        result.append(Tile(pose, np.array(PARTS)[np.digitize(height, (-0.4, 0.3))], pose.name))
     return result
 
 
 def pixels(path):
-    """(height, width, 3) sRGB, the upper row first."""
+    """(height, width, 3) sRGB colors, the top row first."""
     image = bpy.data.images.load(str(path))
     width, height = image.size
     values = np.empty(width * height * image.channels, dtype=np.float32)
@@ -40,17 +40,17 @@ def pixels(path):
 
 
 def hues(colors):
-    """Hue in turns and saturation of (…, 3) colors."""
+    """Hue, from 0 to 1, and saturation of (…, 3) colors."""
     low, high = colors.min(axis=-1), colors.max(axis=-1)
     red, green, blue = np.moveaxis(colors, -1, 0)
     angle = np.arctan2(np.sqrt(3) * (green - blue), 2 * red - green - blue) / (2 * np.pi) % 1
     return angle, (high - low) / np.maximum(high, 1e-6)
 
 
-def share_of(component, image):
-    """Share of an image that has the hue of a component."""
+def share_of(part, image):
+    """Share of an image with the hue of a part."""
     hue, saturation = hues(image)
-    own, _ = hues(palette()[component])
+    own, _ = hues(palette()[part])
     away = np.abs(hue - own)
     return ((np.minimum(away, 1 - away) < 0.03) & (saturation > 0.25)).mean()
 
@@ -59,33 +59,33 @@ def test_picture_shows_each_pose_in_the_colors_of_its_parts(tmp_path):
     path = tmp_path / "poses.png"
     render_poses(tiles(2), path)
     image = pixels(path)
-    assert image.shape == (TILE, 2 * TILE, 3)
-    for half in (image[:, :TILE], image[:, TILE:]):
-        for component in SHOWN:
-            assert share_of(component, half) > 0.01, component
+    assert image.shape == (TILE_PIXELS, 2 * TILE_PIXELS, 3)
+    for half in (image[:, :TILE_PIXELS], image[:, TILE_PIXELS:]):
+        for part in PARTS:
+            assert share_of(part, half) > 0.01, part
         assert share_of(1, half) < 0.002
         background = np.abs(half - half[2, 2]).max(axis=-1) < 0.02
         assert 0.3 < background.mean() < 0.95
 
 
-def test_picture_shows_the_colors_that_the_user_gave(tmp_path):
-    path, given = tmp_path / "poses.png", {part: palette()[1] for part in SHOWN}
+def test_picture_shows_the_users_colors(tmp_path):
+    path, given = tmp_path / "poses.png", {part: palette()[1] for part in PARTS}
     render_poses(tiles(1), path, style=Style(colors=given))
     image = pixels(path)
     assert share_of(1, image) > 0.03
-    assert all(share_of(component, image) < 0.002 for component in SHOWN)
+    assert all(share_of(part, image) < 0.002 for part in PARTS)
 
 
-def test_poses_stand_in_rows(tmp_path):
+def test_poses_are_arranged_in_rows(tmp_path):
     path = tmp_path / "poses.png"
     render_poses(tiles(3), path, columns=2)
     image = pixels(path)
-    assert image.shape == (2 * TILE, 2 * TILE, 3)
-    assert share_of(SHOWN[1], image[TILE:, :TILE]) > 0.01
-    assert share_of(SHOWN[1], image[TILE:, TILE:]) == 0
+    assert image.shape == (2 * TILE_PIXELS, 2 * TILE_PIXELS, 3)
+    assert share_of(PARTS[1], image[TILE_PIXELS:, :TILE_PIXELS]) > 0.01
+    assert share_of(PARTS[1], image[TILE_PIXELS:, TILE_PIXELS:]) == 0
 
 
-def test_nothing_of_the_picture_stays_in_the_file(tmp_path):
+def test_the_temporary_scene_is_removed(tmp_path):
     shown = tiles(2)
     bpy.context.scene.frame_set(5)
     before = scene_snapshot()
@@ -96,9 +96,9 @@ def test_nothing_of_the_picture_stays_in_the_file(tmp_path):
     assert {name: len(getattr(bpy.data, name)) for name in blocks} == blocks
 
 
-def test_nothing_stays_after_a_failure_either(tmp_path):
+def test_the_temporary_scene_is_removed_after_a_failure(tmp_path):
     shown = tiles(1)
-    (tmp_path / "file").write_text("where a folder would have to be")
+    (tmp_path / "file").write_text("a file, where a folder is needed")
     before = scene_snapshot()
     with pytest.raises(UserError, match=r"poses\.png"):
         render_poses(shown, tmp_path / "file" / "poses.png")

@@ -1,4 +1,4 @@
-"""A four-legged creature that walks: a character to segment when none is at hand."""
+"""A four-legged creature that walks: a character for the demo and the tests."""
 
 from math import pi, radians, sin
 from typing import NamedTuple
@@ -11,10 +11,10 @@ LAST_FRAME = 48
 
 
 class Joint(NamedTuple):
-    """One joint of the skeleton and the end of the bone of the same name, which starts at `parent`.
+    """A joint of the skeleton, at the end of the bone of the same name, which starts at the joint `parent`.
 
-    Meters; the creature looks along −Y and stands on Z = 0. A name ending in ``.L`` stands for a pair:
-    the joint and its mirror image ``.R`` at −X.
+    In meters; the creature faces −Y and stands on Z = 0. A name that ends in ``.L`` stands for a pair: the joint and
+    its mirror image ``.R`` at −X.
     """
 
     name: str
@@ -23,7 +23,7 @@ class Joint(NamedTuple):
     radius: float
 
 
-# Positions and radii are those of the cage; subdivision draws the surface a little inwards.
+# Positions and radii are those of the control cage; the subdivided surface lies slightly inside.
 JOINTS = (
     Joint("pelvis", "", (0.0, 0.56, 0.84), 0.21),
     Joint("loin", "pelvis", (0.0, 0.24, 0.85), 0.26),
@@ -58,10 +58,10 @@ JOINTS = (
     Joint("tail_6", "tail_5", (0.0, 1.82, 0.96), 0.06),
     Joint("tail_7", "tail_6", (0.0, 1.98, 1.06), 0.045),
 )
-# Where the bone of the first joint starts: in the belly, so that the whole body sways about its middle.
+# Start of the bone of the first joint: in the belly, so that the whole body sways about its middle.
 ROOT_HEAD = (0.0, 0.06, 0.80)
 RING_SPACING = 0.06
-# A limb's last ring lies this far beyond its joint and is this wide, in radii of the joint: a round end.
+# Distance of a limb's last ring beyond its joint, and radius of that ring, in radii of the joint: a round end.
 TIP_REACH = 0.5
 TIP_RADIUS = 0.65
 SUBDIVISIONS = 2
@@ -112,12 +112,12 @@ SWINGS = (
     *(Swing(f"tail_{i}", 2, 0.0, 14.0, STRIDES, -40.0 * i) for i in range(1, 8)),
 )
 KEY_STEP = 3
-# The axis of pitch, for all bones: turning about it lifts what points forwards and swings a leg to the front.
+# Axis of pitch of all bones: a rotation about it lifts a bone that points forwards, and swings a leg forwards.
 HINGE = Vector((-1.0, 0.0, 0.0))
 
 
 class Ring(NamedTuple):
-    """A ring of the cage: its center and radius in meters, the bones that move it, the ring it continues."""
+    """A ring of the control cage: center and radius in meters, weights of its bones, index of the previous ring."""
 
     center: Vector
     radius: float
@@ -126,7 +126,7 @@ class Ring(NamedTuple):
 
 
 def build_creature(scene: bpy.types.Scene) -> bpy.types.Object:
-    """Build an animated creature in `scene` and return its mesh object.
+    """Build an animated creature in a scene; return its mesh object.
 
     The mesh is one closed surface of 6632 quads, 0.8 m wide, 3.5 m long and 2.1 m high. Its parent is an
     armature whose action loops from ``FIRST_FRAME`` to ``LAST_FRAME``. The scene's frame range, selection and
@@ -138,14 +138,14 @@ def build_creature(scene: bpy.types.Scene) -> bpy.types.Object:
     _animate(armature)
     body.parent = armature
     body.modifiers.new("Armature", "ARMATURE").object = armature
-    # Keys alone do not move a pose: without this it would stay at the last key until the frame changes.
+    # Keys alone do not move the pose: it would stay at the last key until the frame changes.
     armature.update_tag(refresh={"TIME"})
     scene.view_layers[0].update()
     return body
 
 
 def _both_sides() -> list[Joint]:
-    """Return ``JOINTS`` followed by the right partner of each left joint; parents come before children."""
+    """``JOINTS`` followed by the right partner of each left joint; parents come before children."""
     right = []
     for name, parent, (x, y, z), radius in JOINTS:
         if name.endswith(".L"):
@@ -154,7 +154,7 @@ def _both_sides() -> list[Joint]:
 
 
 def _rings(joints: list[Joint]) -> list[Ring]:
-    """Return the rings of the cage along all bones that end in `joints`, the root's first."""
+    """Rings of the control cage along all bones that end in `joints`, those of the root first."""
     named = {joint.name: joint for joint in joints}
     children = {joint.name: [other.name for other in joints if other.parent == joint.name] for joint in joints}
     rings: list[Ring] = []
@@ -163,13 +163,13 @@ def _rings(joints: list[Joint]) -> list[Ring]:
         name, radius = joint.name, joint.radius
         parent = named.get(joint.parent, joint)
         start, end = Vector(parent.position), Vector(joint.position)
-        # Where limbs branch off, the skin closes a hull around the nearest rings and needs them well apart.
+        # At a branch, the skin modifier builds a hull around the nearest rings, which must be well apart.
         at_branch = len(children[parent.name]) > 1 or len(children[name]) > 1
         steps = 1 if at_branch else round((end - start).length / RING_SPACING)
         previous = last[joint.parent]
         for t in ((step + 1) / steps for step in range(steps)):
-            # Half and half at a hinge, all to the bone at its middle: a smooth bend, and no limb pulls at
-            # another. Where limbs branch off, the trunk stays stiff.
+            # Equal weights of both bones at a hinge, one bone alone at its middle: a smooth bend, and no limb moves
+            # another one. At a branch, the trunk stays stiff.
             weights = {name: 1.0}
             neighbors = [parent.name] if t < 0.5 else children[name]
             if len(neighbors) == 1:
@@ -184,7 +184,7 @@ def _rings(joints: list[Joint]) -> list[Ring]:
 
 
 def _build_body(scene: bpy.types.Scene, joints: list[Joint]) -> bpy.types.Object:
-    """Return an object whose mesh wraps the bones of `joints`, with a vertex group of weights for each."""
+    """Add an object whose mesh surrounds the bones of `joints`, with a vertex group of weights for each bone."""
     rings = _rings(joints)
     edges = [(ring.previous, i) for i, ring in enumerate(rings) if ring.previous >= 0]
     sketch = bpy.data.meshes.new("Creature sketch")
@@ -198,9 +198,9 @@ def _build_body(scene: bpy.types.Scene, joints: list[Joint]) -> bpy.types.Object
         point = sketch.skin_vertices[0].data[i]
         point.radius = (ring.radius, ring.radius)
         point.use_root = ring.previous < 0
-        # Otherwise Blender puts rings of its own choice next to a branch, and they cut into each other.
+        # Otherwise Blender adds rings next to a branch, which intersect each other.
         point.use_loose = True
-        # Both modifiers hand vertex groups on, so that the rings' weights become the surface's.
+        # Both modifiers pass on vertex groups, so that the surface gets the weights of the rings.
         for bone, weight in ring.weights.items():
             groups[bone].add([i], weight, "REPLACE")
 
@@ -217,12 +217,12 @@ def _build_body(scene: bpy.types.Scene, joints: list[Joint]) -> bpy.types.Object
 
 
 def _build_armature(scene: bpy.types.Scene, joints: list[Joint]) -> bpy.types.Object:
-    """Return an armature with one bone for each of `joints`, all with the same axis of pitch."""
+    """Add an armature with one bone for each of `joints`, all with the same axis of pitch."""
     armature = bpy.data.objects.new("Creature rig", bpy.data.armatures.new("Creature rig"))
     scene.collection.objects.link(armature)
     heads = {joint.name: joint.position for joint in joints}
     view_layer = scene.view_layers[0]
-    # Bones can be added in edit mode only, and edit mode takes the view layer's own active object.
+    # Bones can be added only in edit mode, which uses the active object of the view layer.
     active = view_layer.objects.active
     view_layer.objects.active = armature
     with bpy.context.temp_override(scene=scene, view_layer=view_layer, active_object=armature):
@@ -239,7 +239,7 @@ def _build_armature(scene: bpy.types.Scene, joints: list[Joint]) -> bpy.types.Ob
 
 
 def _animate(armature: bpy.types.Object) -> None:
-    """Key ``SWINGS``; the last key lies one frame after ``LAST_FRAME`` and equals the first."""
+    """Add keyframes for ``SWINGS``; the last one lies one frame after ``LAST_FRAME`` and equals the first."""
     length = LAST_FRAME + 1 - FIRST_FRAME
     for bone_name in dict.fromkeys(swing.bone for swing in SWINGS):
         bone = armature.pose.bones[bone_name]

@@ -1,4 +1,4 @@
-"""Progress and tables on a terminal."""
+"""Progress and tables on a terminal, and a standard output that has nothing but the result."""
 
 from __future__ import annotations
 
@@ -14,36 +14,37 @@ from ...core.progress import Progress
 
 @contextmanager
 def terminal_progress() -> Iterator[Progress]:
-    """A progress bar on standard error where a person watches and rich is there, else a line a stage."""
+    """Progress on standard error: a bar if it is a terminal and rich is installed, otherwise a line for each report."""
     try:
         from rich.console import Console
         from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
         from rich.progress import Progress as Bar
-    except ImportError:  # inside Blender: the extension carries no wheel just for this
-        yield Progress(_lines)
+    except ImportError:  # inside Blender: rich is not worth a wheel in the extension
+        yield Progress(_print_line)
         return
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield Progress(_lines)
+        yield Progress(_print_line)
         return
     columns = (TextColumn("{task.description:<44}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     with Bar(*columns, console=console) as bar:
         task = bar.add_task("", total=1.0)
 
-        def show(stage: str, share: float) -> None:
-            bar.update(task, description=stage, completed=share)
+        def show(stage: str, fraction: float) -> None:
+            bar.update(task, description=stage or None, completed=fraction)
 
         yield Progress(show)
         bar.update(task, description="Done", completed=1.0)
 
 
-def _lines(stage: str, fraction: float) -> None:
-    print(f"{round(100 * fraction):3d} %  {stage}", file=sys.stderr, flush=True)
+def _print_line(stage: str, fraction: float) -> None:
+    if stage:
+        print(f"{round(100 * fraction):3d} %  {stage}", file=sys.stderr, flush=True)
 
 
 @contextmanager
 def only_result_on_stdout() -> Iterator[TextIO]:
-    """Send what Blender prints to standard error, and give the real standard output for the result."""
+    """Redirect standard output to standard error, since Blender prints there; yield the real one for the result."""
     sys.stdout.flush()
     real = os.dup(1)
     os.dup2(2, 1)
@@ -52,14 +53,14 @@ def only_result_on_stdout() -> Iterator[TextIO]:
             yield result
     finally:
         sys.stdout.flush()
-        # What Blender printed may still wait in the C library, and would come out after the result.
+        # Text that Blender printed may still be in a buffer of the C library, and would follow the result.
         ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None).fflush(None)
         os.dup2(real, 1)
         os.close(real)
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Text in columns: the first to the left, the others to the right."""
+    """Text in columns, of which the first is left-aligned and the others are right-aligned."""
     widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]
 
     def line(cells: Sequence[str]) -> str:

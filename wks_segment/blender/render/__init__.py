@@ -1,1 +1,1 @@
-"""Pictures: contact sheets of poses, confusion matrices."""
+"""Rendered pictures: contact sheets of poses and confusion matrices."""

@@ -1,4 +1,4 @@
-"""A picture of a confusion matrix: a row a class, a column what its queries were taken for."""
+"""Render a confusion matrix: a row for each class, a column for the class that its queries were taken for."""
 
 from __future__ import annotations
 
@@ -12,57 +12,60 @@ from mathutils import Matrix
 from ...core import Retrieval
 from .contact_sheet import add_text, paint, picture_scene, render
 
-CELL = 72
-"""Pixels of a cell."""
-LETTERS, LETTER = 0.36, 0.17
-"""Height of letters and about the width of one, in cells."""
-MARGIN = 0.4
-"""Around all, in cells."""
-RIGHT, WRONG, NOTHING = (0.13, 0.42, 0.70), (0.80, 0.22, 0.16), (0.95, 0.95, 0.96)
-"""sRGB of a cell that all queries of a class are in: on the diagonal, off it, and of one that none is in."""
+CELL_PIXELS = 72
+"""Width and height of a cell, in pixels."""
+TEXT_HEIGHT, LETTER_WIDTH = 0.36, 0.17
+"""Height of text and approximate width of a letter, in cells."""
+MATRIX_MARGIN = 0.4
+"""Width of the margin around the matrix, in cells."""
+RIGHT_COLOR, WRONG_COLOR, EMPTY_COLOR = (0.13, 0.42, 0.70), (0.80, 0.22, 0.16), (0.95, 0.95, 0.96)
+"""sRGB of a cell with all queries of its class, on the diagonal and off it, and of a cell without queries."""
 
 
 def render_matrix(retrieval: Retrieval, path: Path) -> None:
-    """Render the confusion matrix into a PNG file; UserError if it cannot be rendered or written."""
+    """Render the confusion matrix to a PNG file; UserError if it cannot be rendered or written."""
     names, counts = retrieval.names, retrieval.confusion
-    words = f"{retrieval.right} of {retrieval.asked} right ({retrieval.rate:.1%})"
-    note = "row: what it is, column: what it is taken for"
-    label = LETTER * max(map(len, names)) + 0.2
-    width = max(label + len(names), LETTER * max(len(words), len(note))) + 2 * MARGIN
-    height = label + len(names) + 4 * LETTERS + 2 * MARGIN
+    summary = f"{retrieval.right} of {retrieval.asked} right ({retrieval.rate:.1%})"
+    legend = "row: class, column: class that it is taken for"
+    label = LETTER_WIDTH * max(map(len, names)) + 0.2
+    width = max(label + len(names), LETTER_WIDTH * max(len(summary), len(legend))) + 2 * MATRIX_MARGIN
+    height = label + len(names) + 4 * TEXT_HEIGHT + 2 * MATRIX_MARGIN
     with picture_scene() as scene:
         for i, name in enumerate(names):
-            _text(scene, name, -0.2, -i - 0.5 - LETTERS / 3, "RIGHT")
-            _text(scene, name, i + 0.5 + LETTERS / 3, 0.2, "LEFT", turned=True)
+            _text(scene, name, -0.2, -i - 0.5 - TEXT_HEIGHT / 3, "RIGHT")
+            _text(scene, name, i + 0.5 + TEXT_HEIGHT / 3, 0.2, "LEFT", vertical=True)
             for j, count in enumerate(counts[i]):
                 share = count / max(counts[i].sum(), 1)
-                full = RIGHT if i == j else WRONG
-                color = tuple(np.array(NOTHING) + share**0.5 * (np.array(full) - NOTHING))
+                full_color = RIGHT_COLOR if i == j else WRONG_COLOR
+                color = tuple(np.array(EMPTY_COLOR) + share**0.5 * (np.array(full_color) - EMPTY_COLOR))
                 _cell(scene, j, -i, color)
                 if count:
-                    _text(scene, str(count), j + 0.5, -i - 0.5 - LETTERS / 3, "CENTER", light=share > 0.4)
-        for i, line in enumerate((words, note)):
-            _text(scene, line, -label, -len(names) - (1.6 + 1.5 * i) * LETTERS, "LEFT")
+                    _text(scene, str(count), j + 0.5, -i - 0.5 - TEXT_HEIGHT / 3, "CENTER", light=share > 0.4)
+        for i, line in enumerate((summary, legend)):
+            _text(scene, line, -label, -len(names) - (1.6 + 1.5 * i) * TEXT_HEIGHT, "LEFT")
         camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
         camera.data.type = "ORTHO"
         camera.data.ortho_scale = max(width, height)
-        camera.matrix_world = Matrix.Translation((width / 2 - label - MARGIN, label + MARGIN - height / 2, 10.0))
+        camera.matrix_world = Matrix.Translation(
+            (width / 2 - label - MATRIX_MARGIN, label + MATRIX_MARGIN - height / 2, 10.0)
+        )
         scene.collection.objects.link(camera)
         scene.camera = camera
         scene.render.dither_intensity = 0.0  # flat colors, a small file
-        render(scene, path, round(CELL * width), round(CELL * height), light="FLAT")
+        render(scene, path, round(CELL_PIXELS * width), round(CELL_PIXELS * height), light="FLAT")
 
 
 def _text(
-    scene: bpy.types.Scene, text: str, x: float, y: float, align: str, turned: bool = False, light: bool = False
+    scene: bpy.types.Scene, text: str, x: float, y: float, align: str, vertical: bool = False, light: bool = False
 ) -> None:
-    letters = add_text(scene, text, LETTERS, align, (1.0, 1.0, 1.0) if light else (0.05, 0.05, 0.05))
+    """Add text at (x, y), from left to right or, if vertical, upwards."""
+    letters = add_text(scene, text, TEXT_HEIGHT, align, (1.0, 1.0, 1.0) if light else (0.05, 0.05, 0.05))
     letters.location = (x, y, 1.0)
-    letters.rotation_euler.z = pi / 2 if turned else 0.0
+    letters.rotation_euler.z = pi / 2 if vertical else 0.0
 
 
 def _cell(scene: bpy.types.Scene, x: float, y: float, color: tuple[float, ...]) -> None:
-    """A square to the right of and below a place, with a gap to the next."""
+    """Add a square with its upper left corner at (x, y), and a gap to its neighbors."""
     near, far = 0.03, 0.97
     corners = [(x + near, y - near, 0), (x + near, y - far, 0), (x + far, y - far, 0), (x + far, y - near, 0)]
     mesh = bpy.data.meshes.new("cell")

@@ -1,4 +1,4 @@
-"""A picture of poses side by side, each polygon in the color of its segment."""
+"""Render a contact sheet: poses side by side, each polygon in the color of its part."""
 
 from __future__ import annotations
 
@@ -20,35 +20,37 @@ from ..parts.part_style import PLAIN, Style
 from ..scene.attributes import write_attribute
 from ..scene.poses import Pose
 
-TILE = 480
-"""Width and height of a pose in the picture, in pixels."""
-COLUMNS = 4
-VIEW = Vector((-0.85, -1.0, 0.45))
-"""From where the camera looks: front left, a little from above, for a character that faces −Y."""
-MARGIN = 1.16
-"""Width and height of a tile, in those of the largest pose: leaves room for the caption."""
+TILE_PIXELS = 480
+"""Width and height of the tile of a pose, in pixels."""
+TILES_IN_ROW = 4
+VIEW_DIRECTION = Vector((-0.85, -1.0, 0.45))
+"""Direction from the poses to the camera: front left and slightly above, for a character that faces −Y."""
+TILE_SCALE = 1.16
+"""Width and height of a tile, relative to the largest pose; leaves room for the caption."""
 CAPTION_SIZE = 0.05
-"""Height of the letters, in tiles."""
+"""Height of captions, in tiles."""
 BACKGROUND = (0.82, 0.82, 0.84)
-"""Linear RGB of what is behind the poses."""
+"""Linear RGB of the background."""
 CAPTION_COLOR = (0.05, 0.05, 0.05)
-"""sRGB of the letters."""
-COLORS = "color"
+"""sRGB of captions."""
+NO_PART_COLOR = 0.6
+"""sRGB gray value of triangles that belong to no polygon of the character's own mesh."""
+COLOR_ATTRIBUTE = "color"
 
 
 @dataclass(frozen=True)
 class Tile:
-    """One pose in the picture."""
+    """One pose of a contact sheet, with the label of each polygon and a caption."""
 
     pose: Pose
     labels: IntArray
     caption: str
 
 
-def render_poses(tiles: Sequence[Tile], path: Path, columns: int = COLUMNS, style: Style = PLAIN) -> None:
-    """Render poses into one PNG file, `columns` in a row, in the colors of a style.
+def render_poses(tiles: Sequence[Tile], path: Path, columns: int = TILES_IN_ROW, style: Style = PLAIN) -> None:
+    """Render poses to one PNG file, with `columns` tiles in a row, in the colors of a style.
 
-    Uses a scene of its own, which is gone afterwards.
+    The temporary scene that is used for it is removed.
 
     Raises
     ------
@@ -57,25 +59,25 @@ def render_poses(tiles: Sequence[Tile], path: Path, columns: int = COLUMNS, styl
     """
     columns = min(columns, len(tiles))
     rows = ceil(len(tiles) / columns)
-    towards = VIEW.normalized()
+    towards = VIEW_DIRECTION.normalized()
     right = Vector((0, 0, 1)).cross(towards).normalized()
     up = towards.cross(right)
     axes = np.array([right, up, towards])
     placed = [tile.pose.mesh.vertices @ axes.T for tile in tiles]
-    side = MARGIN * max(float(np.ptp(points[:, :2], axis=0).max()) for points in placed)
+    tile_size = TILE_SCALE * max(float(np.ptp(points[:, :2], axis=0).max()) for points in placed)
     with picture_scene() as scene:
         for i, (tile, points) in enumerate(zip(tiles, placed, strict=True)):
             middle = (points.min(axis=0) + points.max(axis=0)) / 2
-            place = np.array([i % columns, -(i // columns), 0.0]) * side
-            _add_pose(scene, (points - middle + place) / side, tile, style)
-            _add_caption(scene, tile.caption, place / side)
+            place = np.array([i % columns, -(i // columns), 0.0]) * tile_size
+            _add_pose(scene, (points - middle + place) / tile_size, tile, style)
+            _add_caption(scene, tile.caption, place / tile_size)
         _add_camera(scene, columns, rows)
-        render(scene, path, TILE * columns, TILE * rows)
+        render(scene, path, TILE_PIXELS * columns, TILE_PIXELS * rows)
 
 
 @contextmanager
 def picture_scene() -> Iterator[bpy.types.Scene]:
-    """An empty scene that takes all that was added to it along when it goes."""
+    """A temporary empty scene, which is removed with everything that was added to it."""
     scene = bpy.data.scenes.new("WKS Segment picture")
     scene.world = bpy.data.worlds.new("WKS Segment picture")
     scene.world.color = BACKGROUND
@@ -91,7 +93,7 @@ def picture_scene() -> Iterator[bpy.types.Scene]:
 
 
 def _add_pose(scene: bpy.types.Scene, points: FloatArray, tile: Tile, style: Style) -> None:
-    """The triangles of a pose in the camera's own axes: x to the right, y up, z towards it."""
+    """Add the triangles of a pose, with points in camera axes: x to the right, y up, z towards the camera."""
     mesh = bpy.data.meshes.new("pose")
     mesh.from_pydata(points.tolist(), [], tile.pose.mesh.faces.tolist())
     mesh.shade_smooth()
@@ -100,9 +102,9 @@ def _add_pose(scene: bpy.types.Scene, points: FloatArray, tile: Tile, style: Sty
 
 
 def _triangle_colors(tile: Tile, style: Style) -> FloatArray:
-    """(m, 3) color of each triangle; gray where it is of no polygon of the character's own."""
+    """(m, 3) color of each triangle, that of the part of its polygon."""
     polygon_of = tile.pose.polygon_of
-    return np.where(polygon_of[:, None] < 0, 0.6, style.colors_of(tile.labels[polygon_of]))
+    return np.where(polygon_of[:, None] < 0, NO_PART_COLOR, style.colors_of(tile.labels[polygon_of]))
 
 
 def _add_caption(scene: bpy.types.Scene, text: str, place: FloatArray) -> None:
@@ -113,13 +115,13 @@ def _add_caption(scene: bpy.types.Scene, text: str, place: FloatArray) -> None:
 def add_text(
     scene: bpy.types.Scene, text: str, size: float, align: str = "CENTER", color: tuple[float, ...] = CAPTION_COLOR
 ) -> bpy.types.Object:
-    """Letters as a mesh, on a line through the origin."""
+    """Add text as a mesh, with its base line through the origin."""
     curve = bpy.data.curves.new("caption", "FONT")
     curve.body = text
     curve.size = size
     curve.align_x = align
     letters = bpy.data.objects.new("caption", curve)
-    # Letters take a color only as a mesh.
+    # Only a mesh can have a color attribute.
     mesh = bpy.data.meshes.new_from_object(letters)
     bpy.data.objects.remove(letters)
     bpy.data.curves.remove(curve)
@@ -130,10 +132,10 @@ def add_text(
 
 
 def paint(mesh: bpy.types.Mesh, srgb: FloatArray) -> None:
-    """Give each corner of a mesh one of the (corners, 3) colors."""
+    """Set the color of each corner of a mesh; srgb is an array (corners, 3)."""
     colors = np.ones((len(mesh.loops), 4), dtype=np.float32)
     colors[:, :3] = srgb
-    attribute = mesh.color_attributes.new(COLORS, "BYTE_COLOR", "CORNER")
+    attribute = mesh.color_attributes.new(COLOR_ATTRIBUTE, "BYTE_COLOR", "CORNER")
     write_attribute(attribute, colors)
     mesh.color_attributes.active_color = attribute
 
@@ -149,12 +151,12 @@ def _add_camera(scene: bpy.types.Scene, columns: int, rows: int) -> None:
 
 
 def render(scene: bpy.types.Scene, path: Path, width: int, height: int, light: str = "STUDIO") -> None:
-    """Render a scene to a PNG file, in the colors of its meshes; UserError if that fails or it cannot be written."""
+    """Render a scene to a PNG file, in the colors of its meshes; UserError if it cannot be rendered or written."""
     scene.render.engine = "BLENDER_WORKBENCH"
     scene.render.resolution_x, scene.render.resolution_y = width, height
     scene.render.resolution_percentage = 100
     scene.render.image_settings.file_format = "PNG"
-    # A plain name, since Blender takes braces for templates and adds a suffix that it misses.
+    # A temporary file with a plain name: Blender replaces braces in names and adds a missing suffix.
     temporary = Path(tempfile.mkdtemp()) / "picture.png"
     scene.render.filepath = str(temporary)
     scene.view_settings.view_transform = "Standard"
@@ -164,10 +166,12 @@ def render(scene: bpy.types.Scene, path: Path, width: int, height: int, light: s
     try:
         bpy.ops.render.render(write_still=True, scene=scene.name)
     except RuntimeError as error:
-        raise UserError(f"{path}: the picture could not be rendered: {error}") from error
+        raise UserError("{path}: the picture could not be rendered: {reason}", path=path, reason=error) from error
     try:
         shutil.move(temporary, path)
     except OSError as error:
-        raise UserError(f"{path}: the picture could not be written: {error.strerror or error}") from error
+        raise UserError(
+            "{path}: the picture could not be written: {reason}", path=path, reason=error.strerror or error
+        ) from error
     finally:
         shutil.rmtree(temporary.parent, ignore_errors=True)

@@ -1,1 +1,1 @@
-"""One module for each command: its options, and what it runs."""
+"""One module for each command, which adds its parser and runs it."""

@@ -1,30 +1,42 @@
-"""`apply`."""
+"""Command `apply`: label poses with a given model, or with the best of several."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
-from ....core import Cache, MemoryCache
+from ....core import MemoryCache, Ranking
 from ....core.progress import Progress
 from ...errors import UserError
 from ...scene import file_formats
+from ...scene.poses import Pose
 from ...workflow import model_library, pipeline
-from ...workflow.model_ranking import largest, rank_poses, verdict_message
+from ...workflow.model_ranking import NamedModel, largest, rank_poses, verdict_message
 from ...workflow.pipeline import Run
 from ...workflow.report import Report
-from .common import cache_of, candidates_in, check_outputs, label, read_poses, result_of, settings_of
-from .options import add_labeling, add_means, add_model, add_outputs, add_poses
+from ..options import (
+    add_labeling_settings,
+    add_model,
+    add_outputs,
+    add_poses,
+    add_resources,
+    cache_from,
+    settings_from,
+)
+from ..reading import read_models, read_poses
+from ..results import check_outputs, label_and_write, result_of
 
 
 def add(commands: Any) -> None:
-    """Add the command to a parser's."""
+    """Add the command to the subparsers of the command line."""
     apply = commands.add_parser("apply", help="find the parts of a model in files")
     add_poses(apply)
     add_model(apply)
-    add_labeling(apply)
+    add_labeling_settings(apply)
     add_outputs(apply)
-    add_means(apply)
+    add_resources(apply)
     apply.set_defaults(run=_apply)
 
 
@@ -32,31 +44,37 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     if not (options.output or options.render):
         raise UserError("apply has nothing to write: give --output, --render or both")
     check_outputs(options)
-    cache: Cache | None = cache_of(options)
-    report = Report([])
-    best = None
+    run = Run(Report([]), progress, cache_from(options), options.threads)
+    verdict = {}
     if options.models is None:
-        model, name = model_library.loaded(options.model), options.model.stem
-        poses = read_poses(options, report)
+        chosen = NamedModel(options.model.stem, model_library.loaded(options.model))
+        poses = read_poses(options, run.report)
     else:
-        found = candidates_in(options.models, report)
-        poses = read_poses(options, report)
-        pipeline.check_limits(largest(found), poses, settings_of(options))
-        # What is described for the ranking serves labeling.
-        cache = cache or MemoryCache()
-        ranking = rank_poses(found, poses, Run(report, progress, cache, options.threads))
-        model, name = found[ranking.best.index].model, found[ranking.best.index].name
-        best = {"best": name, "verdict": ranking.verdict}
-        if ranking.verdict != "sure":
-            report.warn(verdict_message(ranking, [candidate.name for candidate in found]))
-    report.add_model(model)
-    settings = settings_of(options)
-    model_library.add_model(settings, model, name, [f"From {name}", f"{model.n_segments_} segments"])
+        models = read_models(options.models, run.report)
+        poses = read_poses(options, run.report)
+        # Signatures that are computed for the ranking serve to label as well.
+        run = replace(run, cache=run.cache or MemoryCache())
+        ranking = _rank(models, poses, options, run)
+        chosen = models[ranking.best.index]
+        verdict = {"best": chosen.name, "verdict": ranking.verdict}
+    model = chosen.model
+    run.report.add_model(model)
+    settings = settings_from(options)
+    model_library.add_model(settings, model, chosen.name, [f"From {chosen.name}", f"{model.n_segments_} segments"])
     if options.smoothness is not None:
         model.smoothness = settings.smoothness
     pipeline.check_limits(model, poses, settings)
-    described = pipeline.describe(model, poses, Run(report, progress, cache, options.threads))
-    label(model, poses, described, settings, options, report, progress)
+    described = pipeline.describe(model, poses, run)
+    label_and_write(model, poses, described, settings, options, run)
     if options.output:
         file_formats.save_scene(options.output)
-    return result_of(options, report) | (best or {})
+    return result_of(options, run.report) | verdict
+
+
+def _rank(models: Sequence[NamedModel], poses: Sequence[Pose], options: argparse.Namespace, run: Run) -> Ranking:
+    """Rank models by how well they fit the poses; warn if none fits for sure."""
+    pipeline.check_limits(largest(models), poses, settings_from(options))
+    ranking = rank_poses(models, poses, run)
+    if ranking.verdict != "sure":
+        run.report.warn(verdict_message(ranking, [named.name for named in models]))
+    return ranking

@@ -1,0 +1,126 @@
+"""Files that commands write, and the result that they print."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ...core import PartNotes, PoseSegmentation
+from ...core.message import message_of
+from ..errors import UserError
+from ..outputs.overrides import merge_parts
+from ..parts import part_ids
+from ..props.settings import WKSSegmentSettings
+from ..render.contact_sheet import Tile, render_poses
+from ..scene import file_formats
+from ..scene.poses import Pose
+from ..workflow import pipeline
+from ..workflow.pipeline import LabelRequest, Run
+from ..workflow.report import Report
+from .terminal import table
+
+
+def check_outputs(options: argparse.Namespace) -> None:
+    """UserError if a scene or a picture of the options cannot be written; called before the computation."""
+    if options.output:
+        file_formats.check_output(options.output)
+    if options.render:
+        check_picture(options.render)
+
+
+def check_picture(path: Path) -> None:
+    """UserError if a picture cannot be written to a path."""
+    if path.suffix.lower() != ".png":
+        raise UserError("{path}: a picture must have the suffix .png", path=path)
+    file_formats.check_folder(path)
+
+
+def label_and_write(
+    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[Any], settings: WKSSegmentSettings,
+    options: argparse.Namespace, run: Run, renumbered: bool = False,
+) -> None:  # fmt: skip
+    """Label poses; write the labels to the meshes and a picture, if the options ask for a scene and for a picture.
+
+    See `pipeline.write_outputs` for `renumbered`.
+    """
+    run = run.with_progress(run.progress.part(1.0, 1.0))  # takes no time beside the signatures
+    request = LabelRequest.of(settings, (pose.character for pose in poses))
+    labels = pipeline.label(model, poses, described, request, run)
+    if options.output:
+        weights = pipeline.soften(model, poses, described, labels, request, run)
+        pipeline.write_outputs(settings, labels, request, run.report, weights, renumbered)
+    elif renumbered:
+        settings.keep_notes(PartNotes())
+    if options.render:
+        with run.report.stage("render"):
+            joined = settings.notes().joined
+            tiles = [Tile(pose, merge_parts(labels[pose.character], joined), pose.name) for pose in poses]
+            render_poses(tiles, options.render, style=settings.style())
+
+
+def save_model(model: PoseSegmentation, path: Path) -> None:
+    """Write a model to a file; UserError if it cannot be written."""
+    try:
+        model.save(path)
+    except ValueError as error:
+        raise UserError("{path}: {reason}", path=path, reason=message_of(error)) from error
+    except OSError as error:
+        raise UserError(
+            "{path}: the model could not be written: {reason}", path=path, reason=error.strerror or error
+        ) from error
+
+
+def result_of(options: argparse.Namespace, report: Report) -> dict[str, Any]:
+    """Result of a command that segments or labels, as a JSON object."""
+    outputs = {name: getattr(options, name, None) for name in ("model", "output", "render")}
+    return {
+        "poses": [
+            {
+                "name": pose.name,
+                "vertices": pose.mesh.n_vertices,
+                "triangles": pose.mesh.n_faces,
+                "laplacian": laplacian,
+            }
+            for pose, laplacian in zip(report.poses, report.laplacians, strict=True)
+        ],
+        "segments": report.n_segments,
+        **({"parts": report.parts} if report.parts else {}),
+        **({} if report.certainty is None else {"certainty": report.certainty}),
+        "notes": report.notes,
+        "seconds": rounded_seconds(report),
+        "warnings": report.warnings,
+        "files": {name: str(path) for name, path in outputs.items() if path is not None},
+    }
+
+
+def rounded_seconds(report: Report) -> dict[str, float]:
+    """Duration of each stage in seconds, to the millisecond."""
+    return {name: round(seconds, 3) for name, seconds in report.seconds.items()}
+
+
+def result_text(result: dict[str, Any]) -> str:
+    """Text of the result of a command that segments or labels, or of the demo."""
+    is_demo = "agreement" in result["poses"][0]
+    header = ["pose", "vertices", *(["", "agreement"] if is_demo else [])]
+    rows = [
+        [pose["name"], f"{pose['vertices']:,}"]
+        + (["learned" if pose["learned"] else "unseen", f"{pose['agreement']:.3f}"] if is_demo else [])
+        for pose in result["poses"]
+    ]
+    stages = [[name, f"{seconds:.1f}"] for name, seconds in result["seconds"].items()]
+    count = part_ids.count_text(result["segments"], len(result.get("parts", {})))
+    lines = [table(header, rows), "", table(["stage", "seconds"], stages), "", count]
+    if is_demo:
+        lines.append(f"agreement of unseen poses: {result['agreement']:.3f} of the area has the learned label")
+    lines += result["notes"]
+    return "\n".join([*lines, *warnings_and_files(result)])
+
+
+def warnings_and_files(result: dict[str, Any]) -> list[str]:
+    """Lines of text with the warnings and the written files of a result."""
+    return [
+        *(f"warning: {warning}" for warning in result["warnings"]),
+        *(f"{name}: {path}" for name, path in result.get("files", {}).items()),
+    ]
