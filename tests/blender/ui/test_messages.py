@@ -1,15 +1,17 @@
 """What the extension says while it works, in German: no message of the code is left in English."""
 
 import ast
+import re
 import string
 from types import SimpleNamespace
 
 import bpy
 import pytest
+from builders import limbed_rigged, mesh_object, select
 from message_templates import SOURCES, all_calls, fields, name_of, sentences_made_on_the_spot, templates
 
 from wks_segment.blender.operators import _report
-from wks_segment.blender.ui import messages
+from wks_segment.blender.ui import messages, models_panel
 from wks_segment.blender.ui.german.interface import GERMAN_OPERATORS
 from wks_segment.blender.ui.german.messages import GERMAN_MESSAGES
 from wks_segment.blender.ui.german.names import GERMAN_NAMES
@@ -200,3 +202,32 @@ def test_job_and_panel_speak_german(extension, monkeypatch):
     operator = SimpleNamespace(report=lambda kind, text: said.append((kind, text)))
     _report.tell(operator, {"WARNING"}, job.end_message)
     assert said == [({"WARNING"}, "Lernen und segmentieren: abgebrochen, nichts ist geschrieben")]
+
+
+def test_a_run_speaks_german(settings, printed, monkeypatch):
+    select(limbed_rigged())
+    settings.source, settings.pose_count = "FRAMES", 2
+    monkeypatch.setattr(messages, "bpy", Blender("de_DE"))
+    assert bpy.ops.wks_segment.learn() == {"FINISHED"}
+    (line,) = [line for line in printed().out.splitlines() if "Gelernt" in line]
+    assert re.search(r"Gelernt: 2 Posen, [\d,]+ Vertices, 4 Segmente, [\d.]+ Sekunden$", line)
+    # What is stored with the scene is English, and shown in the language of whoever opens it.
+    assert settings.model_summary.splitlines()[:2] == ["From Walker", "2 poses"]
+    assert " ".join(models_panel.details(settings)).startswith("Aus Walker 2 Posen · ")
+    monkeypatch.setattr(messages, "bpy", Blender("en_US"))
+    assert " ".join(models_panel.details(settings)).startswith("From Walker 2 poses · ")
+    settings.model_summary = "From a script"
+    monkeypatch.setattr(messages, "bpy", Blender("de_DE"))
+    assert models_panel.details(settings)[0] == "From a script"
+
+
+def test_an_error_of_the_core_is_german_down_to_its_reason(settings, monkeypatch, tmp_path):
+    monkeypatch.setattr(messages, "bpy", Blender("de_DE"))
+    path = tmp_path / "a.json"
+    path.write_text("{}", encoding="utf-8")
+    with pytest.raises(RuntimeError, match=r"a.json wurde nicht geladen: das ist kein Modell von WKS Segment\s*$"):
+        bpy.ops.wks_segment.load_model(filepath=str(path))
+    flat = mesh_object([(0, 0, 0)] * 4, [(0, 1, 2), (0, 2, 3)], "Flat")
+    select(flat)
+    with pytest.raises(RuntimeError, match='"Flat": das Mesh hat keinen Flächeninhalt'):
+        bpy.ops.wks_segment.learn()
