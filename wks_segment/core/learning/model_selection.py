@@ -109,7 +109,7 @@ class CandidatePlan:
     def _mixtures(self, progress: Progress) -> list[GaussianMixture]:
         samples, shares = self.training.standardized, self.training.shares
         mixtures = []
-        for kind, step in progress.each(self.covariance_types):
+        for kind, step in progress.never_falling().each(self.covariance_types):
             count = self._n_components(kind)
             try:
                 mixtures += fit_mixtures(samples, shares, count, kind, None, CANDIDATES_PER_TYPE, step)
