@@ -154,7 +154,7 @@ def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[Work
     progress = run.progress.titled("Learning the segments")
     with run.report.stage("mixture"):
         try:
-            model.fit(described, progress.report, poses[0].upright, run.cache)
+            model.fit(described, progress, poses[0].upright, run.cache)
         except ValueError as error:
             raise UserError("The segments could not be learned: {reason}", reason=message_of(error)) from error
     run.report.add_model(model)
@@ -175,7 +175,7 @@ def describe(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[W
             signatures = model.describe_all(
                 [poses[i].mesh for i in distinct],
                 [connections[i] for i in distinct],
-                run.progress.titled("Signature of {stage}").report,
+                run.progress.titled("Signature of {stage}"),
                 [Message('"{pose}"', pose=poses[i].name) for i in distinct],
                 workers=run.workers,
                 cache=run.cache,

@@ -19,26 +19,26 @@ def as_text(messages: Sequence[str]) -> str:
 
 def as_json(messages: Sequence[str]) -> str:
     """Messages with their templates and values."""
-    return json.dumps([_fields(message) for message in messages])
+    return json.dumps([_as_plain(message) for message in messages])
 
 
 def restored(text: str, stored: str) -> list[str]:
     """The messages that a text was stored with; its lines if there are none, or none that say the same."""
     try:
-        messages = [_message(fields) for fields in json.loads(stored or "[]")]
+        messages = [_from_plain(fields) for fields in json.loads(stored or "[]")]
     except (ValueError, LookupError, TypeError, AttributeError):
         messages = []
     return messages if messages and as_text(messages) == text else text.splitlines()
 
 
-def _fields(value: object) -> Any:
+def _as_plain(value: object) -> Any:
     if isinstance(value, Message):
-        return {"template": value.template, "values": {name: _fields(each) for name, each in value.values.items()}}
+        return {"template": value.template, "values": {name: _as_plain(each) for name, each in value.values.items()}}
     return value if isinstance(value, str | int | float) else str(value)
 
 
-def _message(fields: Any) -> Any:
+def _from_plain(fields: Any) -> Any:
     if isinstance(fields, dict):
-        values = {name: _message(value) for name, value in fields["values"].items()}
+        values = {name: _from_plain(value) for name, value in fields["values"].items()}
         return Message(fields["template"], **values)
     return fields
