@@ -12,9 +12,9 @@ from message_templates import SOURCES, all_calls, fields, name_of, sentences_mad
 
 from wks_segment.blender.operators import _report
 from wks_segment.blender.ui import messages, models_panel
-from wks_segment.blender.ui.german.interface import GERMAN_OPERATORS
-from wks_segment.blender.ui.german.messages import GERMAN_MESSAGES
-from wks_segment.blender.ui.german.names import GERMAN_NAMES
+from wks_segment.blender.ui.german.interface_texts import GERMAN_OPERATORS
+from wks_segment.blender.ui.german.message_texts import GERMAN_MESSAGES
+from wks_segment.blender.ui.german.part_names import GERMAN_NAMES
 from wks_segment.blender.ui.segments_panel import NAME_PRESETS
 from wks_segment.blender.ui.translations import MESSAGE, NAME, TRANSLATIONS
 from wks_segment.core.message import Message

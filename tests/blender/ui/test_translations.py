@@ -4,7 +4,7 @@ import bpy
 import pytest
 
 from wks_segment.blender import registration
-from wks_segment.blender.ui.german.interface import GERMAN_INTERFACE, GERMAN_OPERATORS
+from wks_segment.blender.ui.german.interface_texts import GERMAN_INTERFACE, GERMAN_OPERATORS
 from wks_segment.blender.ui.translations import MESSAGE, NAME, OPERATOR, TRANSLATIONS
 
 pytestmark = pytest.mark.usefixtures("scene")

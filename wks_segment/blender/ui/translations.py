@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from .german.interface import GERMAN_INTERFACE, GERMAN_OPERATORS
-from .german.messages import GERMAN_MESSAGES
-from .german.names import GERMAN_NAMES
+from .german.interface_texts import GERMAN_INTERFACE, GERMAN_OPERATORS
+from .german.message_texts import GERMAN_MESSAGES
+from .german.part_names import GERMAN_NAMES
 
 OPERATOR = "Operator"
 """Blender's context for names of operators. Names and descriptions of everything else are in its default context."""

@@ -1,1 +1,1 @@
-"""The German texts: `messages`, the `interface` (names and descriptions of settings and buttons), and `names` of parts."""
+"""The German texts: messages, names and descriptions of the interface, and names of parts of a body."""
