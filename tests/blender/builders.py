@@ -1,4 +1,4 @@
-"""Small characters, and what the tests ask of a mesh and of a command."""
+"""Builders of small characters, and helpers that read meshes, scenes and commands."""
 
 import json
 from functools import cache
@@ -62,12 +62,12 @@ def limbed(name="Limbed", bend=0.0, subdivisions=4):
 
 
 def limbed_poses(*bends, subdivisions=4):
-    """A ball with three limbs, an object a pose."""
+    """A ball with three limbs, one object for each pose."""
     return [limbed(f"Pose {i}", bend, subdivisions) for i, bend in enumerate(bends)]
 
 
 def limbed_keys(*bends, name="Keyed"):
-    """A ball with three limbs, a shape key a pose, behind the basis."""
+    """A ball with three limbs, with a shape key for each pose after the basis."""
     obj = limbed(name)
     basis = coordinates(obj.data)
     obj.shape_key_add(name="Basis")
@@ -161,7 +161,7 @@ def numbers(mesh, name, prop="value", width=1):
 
 
 def labels_of(obj):
-    """(p,) components that were written to an object's faces."""
+    """(p,) parts that were written to an object's faces."""
     return numbers(obj.data, "wks_segment").astype(int)
 
 
@@ -175,7 +175,7 @@ READABLE = {".sculpt_face_set", ".uv_seam", ".hide_poly"}
 
 
 def snapshot(mesh):
-    """All that an artist could miss of a mesh, in a form that can be compared."""
+    """Everything of a mesh that an artist could miss, in a form that can be compared."""
     attributes = {}
     for attribute in mesh.attributes:
         values = b""
@@ -222,7 +222,7 @@ def groups_snapshot(obj):
 
 
 def object_snapshot(obj):
-    """What an artist could miss of an object."""
+    """Everything of an object that an artist could miss."""
     mesh = obj.type == "MESH"
     return {
         "selected": obj.select_get(),
@@ -241,7 +241,7 @@ def object_snapshot(obj):
 
 
 def pose_snapshot(armature):
-    """How an armature is posed, and by what."""
+    """Pose of an armature, and what moves it."""
     data = armature.animation_data
     moved_by = data and (data.action and data.action.name, getattr(data, "action_slot", None), data.use_nla)
     bones = {
@@ -255,7 +255,7 @@ def pose_snapshot(armature):
 
 
 def image_snapshot(image):
-    """What is in an image, and what its numbers mean."""
+    """Pixels of an image, and how their numbers are interpreted."""
     values = np.empty(image.channels * image.size[0] * image.size[1], dtype=np.float32)
     image.pixels.foreach_get(values)
     return (tuple(image.size), image.colorspace_settings.name, values.tobytes())
@@ -281,7 +281,7 @@ def scene_snapshot():
 
 
 def listed(settings):
-    """The list of segments, as it is seen."""
+    """The list of segments as the panel shows it."""
     return [(item.number, item.name, round(item.share, 3), item.hidden) for item in settings.segments]
 
 
@@ -310,7 +310,7 @@ class Outcome:
 
 
 def read_labels(mesh):
-    """(p,) components that were written to the polygons of a mesh, found by the note on it; None if there are none."""
+    """(p,) parts that were written to the polygons of a mesh, found by its ledger; None if there are none."""
     name = mesh[LEDGER].get("faces", "") if has_labels(mesh) else ""
     if name not in mesh.attributes:
         return None

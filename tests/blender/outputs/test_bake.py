@@ -1,4 +1,4 @@
-"""The ID map: every pixel has exactly the color of the segment that is there, and nothing else changes."""
+"""The ID map: every pixel has exactly the color of the segment of its face, and nothing else changes."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
 SIZE = 256
 NEAR = 0.01
-"""In pixels: Blender moves the raster by a thousandth, so that no middle of a pixel is on an edge."""
+"""In pixels: Blender moves the raster by a thousandth, so that no center of a pixel is on an edge."""
 CHARACTERS = Path(__file__).resolve().parents[4] / "shared" / "data" / "characters"
 
 
@@ -62,7 +62,7 @@ def colors_of(labels, style):
 
 
 def covering(mesh, size, uv_map=None):
-    """For each triangle of a UV map: its polygon, rows and columns of pixels, and how deep inside their middles are.
+    """For each triangle of a UV map: its polygon, rows and columns of pixels, and how far inside their centers are.
 
     In pixels; nearer to an edge than NEAR, either side may be seen.
     """
@@ -88,7 +88,7 @@ def covering(mesh, size, uv_map=None):
 
 
 def wrong_pixels(image, objects, style):
-    """How many pixels whose middle a face covers have the color of no such face, and how many pixels these are."""
+    """How many pixels whose center a face covers have the color of no such face, and how many pixels these are."""
     seen = pixels(image)
     covered, right = np.zeros((2, *seen.shape[:2]), dtype=bool)
     for obj in objects:
@@ -126,7 +126,7 @@ def test_every_pixel_has_a_color_of_the_palette_or_is_black(labeled):
 
 
 @pytest.mark.parametrize("margin", [0, 3, 12])
-def test_margin_is_as_wide_as_asked_for(labeled, settings, margin):
+def test_margin_has_the_chosen_width(labeled, settings, margin):
     settings.bake_size, settings.bake_margin = 64, 0
     OPS.bake()
     island = pixels(image_of(labeled)).any(axis=2)
@@ -140,7 +140,7 @@ def test_margin_is_as_wide_as_asked_for(labeled, settings, margin):
     np.testing.assert_array_equal(grown, island | (away <= margin))
 
 
-def test_a_modifier_that_moves_uvs_is_baked_as_it_is_seen(labeled):
+def test_uvs_moved_by_a_modifier_are_baked_as_they_are_seen(labeled):
     labeled.modifiers.new("Smooth", "SUBSURF").levels = 1
     OPS.bake()
     depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -159,7 +159,7 @@ def test_the_image_is_saved_with_the_file(labeled, tmp_path):
     np.testing.assert_array_equal(pixels(image_of(bpy.data.objects["Limbed"])), before)
 
 
-# What is not
+# What does not change
 
 
 def test_nothing_else_changes(labeled):
@@ -192,7 +192,7 @@ def test_clear_removes_the_image_unless_it_is_used(labeled):
         assert not changes(before, scene_snapshot())
 
 
-def test_new_labels_keep_the_image_until_it_is_baked_anew(labeled):
+def test_new_labels_keep_the_image_until_it_is_baked_again(labeled):
     OPS.bake()
     image, before = image_of(labeled), pixels(image_of(labeled))
     write_labels(labeled.data, 3 - stripes(labeled.data))
@@ -203,7 +203,7 @@ def test_new_labels_keep_the_image_until_it_is_baked_anew(labeled):
     assert wrong_pixels(image, [labeled], Style())[0] == 0
 
 
-def test_undo_gives_back_what_was(labeled):
+def test_undo_restores_everything(labeled):
     before = scene_snapshot()
     bpy.ops.ed.undo_push(message="before")
     OPS.bake()
@@ -212,10 +212,10 @@ def test_undo_gives_back_what_was(labeled):
     assert not changes(before, scene_snapshot())
 
 
-# UV maps that cannot be used, or not quite
+# UV maps that cannot be used, or only in part
 
 
-def test_without_a_uv_map_it_is_refused_or_unwrapped_if_asked_for(settings):
+def test_without_a_uv_map_bake_is_refused_or_unwraps_if_told_to(settings):
     obj = limbed()
     write_labels(obj.data, stripes(obj.data))
     settings.bake_size = SIZE
@@ -259,7 +259,7 @@ def test_faces_that_overlap_and_faces_outside_are_warned_of(labeled, settings, p
     assert "lies on other" not in said
 
 
-def test_no_segments_no_bake(settings):
+def test_bake_needs_segments(settings):
     select(unwrapped(limbed()))
     assert not OPS.bake.poll()
 
@@ -349,7 +349,7 @@ def file(labeled, tmp_path):
     return tmp_path / "labeled.blend"
 
 
-def test_command_bakes_what_is_labeled(file, command, tmp_path):
+def test_command_bakes_labels_in_the_file(file, command, tmp_path):
     output = tmp_path / "map.png"
     done = command("bake", file, "--output", output, "--size", 128, "--palette", "color_blind", "--json")
     assert done.code == 0, done
@@ -362,7 +362,7 @@ def test_command_bakes_what_is_labeled(file, command, tmp_path):
     assert (wrong, inside > 0.2 * 128**2) == (0, True)
 
 
-def test_command_writes_an_image_an_object_where_they_overlap(settings, command, tmp_path):
+def test_command_writes_an_image_for_each_object_if_uv_maps_overlap(settings, command, tmp_path):
     body, hat = quad("Body", 0.02), quad("Hat", 0.2, (2, 3))
     hat.parent = body
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "two.blend"))

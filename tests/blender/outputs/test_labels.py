@@ -1,4 +1,4 @@
-"""Writing labels: what is there is kept, and Clear gives back exactly what was."""
+"""Writing labels keeps what the artist has on the mesh, and Clear restores exactly what was there."""
 
 import bpy
 import numpy as np
@@ -14,7 +14,7 @@ pytestmark = pytest.mark.usefixtures("scene")
 
 @pytest.fixture
 def mesh():
-    """A mesh with nothing on it that an artist made."""
+    """A mesh without anything of an artist."""
     return limbed().data
 
 
@@ -85,7 +85,7 @@ def test_each_face_has_one_flat_color_of_the_palette(mesh):
     np.testing.assert_array_equal(corners[:, 3], 1)
 
 
-def test_colors_are_shown_and_what_is_rendered_stays(painted):
+def test_colors_are_shown_and_the_rendered_ones_stay(painted):
     rendered = painted.color_attributes[painted.color_attributes.render_color_index].name
     write_labels(painted, stripes(painted))
     assert painted.color_attributes.active_color.name == "wks_segment_color"
@@ -98,7 +98,7 @@ def test_without_colors_the_active_color_stays(painted):
     assert painted.color_attributes.active_color.name == "Tint"
 
 
-def test_materials_come_behind_those_of_the_artist(painted):
+def test_our_materials_come_after_the_artists(painted):
     labels = stripes(painted)
     write_labels(painted, labels, OutputOptions(materials=True))
     assert [m and m.name for m in painted.materials[:3]] == ["Skin", "Cloth", None]
@@ -112,12 +112,12 @@ def test_materials_come_behind_those_of_the_artist(painted):
         assert srgb == pytest.approx(palette()[label], abs=1e-3)
 
 
-def test_only_components_that_occur_get_a_material(mesh):
+def test_only_parts_that_occur_get_a_material(mesh):
     write_labels(mesh, np.where(np.arange(len(mesh.polygons)) < 5, 2, 7), OutputOptions(materials=True))
     assert [material.name for material in mesh.materials] == ["Segment 3", "Segment 8"]
 
 
-def test_meshes_share_the_material_of_a_component(mesh):
+def test_meshes_share_the_material_of_a_part(mesh):
     other = limbed("Other").data
     write_labels(mesh, stripes(mesh), OutputOptions(materials=True))
     write_labels(other, stripes(other), OutputOptions(materials=True))
@@ -133,7 +133,7 @@ def test_meshes_share_the_material_of_a_component(mesh):
 
 
 def kept(before, after):
-    """Whether all that was on a mesh is there still, beside what is new."""
+    """Whether everything of the artist on a mesh is still there, next to what is new."""
     for name, attribute in before["attributes"].items():
         if name != "material_index":
             assert after["attributes"][name] == attribute, name
@@ -211,7 +211,7 @@ def test_second_write_replaces_the_first(painted):
     assert not [name for name in twice["attributes"] if name.endswith(".001")]
 
 
-def test_second_write_without_colors_and_materials_removes_those_of_the_first(painted):
+def test_writing_without_colors_and_materials_removes_earlier_ones(painted):
     before = snapshot(painted)
     write_labels(painted, stripes(painted), OutputOptions(materials=True))
     write_labels(painted, stripes(painted), OutputOptions(colors=False))
@@ -227,7 +227,7 @@ def test_second_write_without_colors_and_materials_removes_those_of_the_first(pa
 @pytest.mark.parametrize("colors", [False, True])
 @pytest.mark.parametrize("materials", [False, True])
 @pytest.mark.parametrize("who", ["mesh", "painted"])
-def test_clear_gives_back_exactly_what_was(request, who, colors, materials):
+def test_clear_restores_exactly_what_was_there(request, who, colors, materials):
     mesh = request.getfixturevalue(who)
     before, materials_before = snapshot(mesh), bpy.data.materials[:]
     write_labels(mesh, stripes(mesh), OutputOptions(colors=colors, materials=materials))
@@ -237,7 +237,7 @@ def test_clear_gives_back_exactly_what_was(request, who, colors, materials):
     assert bpy.data.materials[:] == materials_before
 
 
-def test_clear_after_several_writes_gives_back_exactly_what_was(painted):
+def test_clear_after_several_writes_restores_exactly_what_was_there(painted):
     before = snapshot(painted)
     for count, materials in ((5, True), (3, False), (4, True)):
         write_labels(painted, stripes(painted, count), OutputOptions(materials=materials))
@@ -252,7 +252,7 @@ def test_clear_without_labels_does_nothing(painted):
     assert read_labels(painted) is None
 
 
-def test_clear_leaves_what_the_artist_added_in_between(painted):
+def test_clear_leaves_what_the_artist_added_since(painted):
     write_labels(painted, stripes(painted), OutputOptions(materials=True))
     painted.materials.append(bpy.data.materials.new("Fur"))
     painted.attributes.new("late", "FLOAT", "FACE")
@@ -261,7 +261,7 @@ def test_clear_leaves_what_the_artist_added_in_between(painted):
     assert "late" in painted.attributes
 
 
-def test_clear_works_after_the_artist_removed_some_of_it(painted):
+def test_clear_works_after_the_artist_removed_some_outputs(painted):
     write_labels(painted, stripes(painted), OutputOptions(materials=True))
     for name in ("wks_segment", "wks_segment_color"):
         painted.attributes.remove(painted.attributes[name])
@@ -271,7 +271,7 @@ def test_clear_works_after_the_artist_removed_some_of_it(painted):
     assert painted.color_attributes.active_color.name == "Tint"
 
 
-def test_a_copy_of_a_labeled_mesh_is_cleared_by_itself(painted):
+def test_clearing_a_copy_of_a_labeled_mesh_leaves_the_original(painted):
     before = snapshot(painted)
     write_labels(painted, stripes(painted), OutputOptions(materials=True))
     labeled, copy = snapshot(painted), painted.copy()
@@ -280,7 +280,7 @@ def test_a_copy_of_a_labeled_mesh_is_cleared_by_itself(painted):
     assert not changes(labeled, snapshot(painted))
 
 
-def test_materials_that_hang_on_the_object_stay_there(mesh):
+def test_materials_linked_to_the_object_stay_there(mesh):
     obj = bpy.data.objects["Limbed"]
     mesh.materials.append(bpy.data.materials.new("On the mesh"))
     obj.material_slots[0].link = "OBJECT"
@@ -292,7 +292,7 @@ def test_materials_that_hang_on_the_object_stay_there(mesh):
     assert [material.name for material in mesh.materials] == ["On the mesh"]
 
 
-def test_user_of_the_mesh_beside_the_labeled_object_shows_the_labels(mesh):
+def test_other_objects_of_the_mesh_show_the_labels(mesh):
     twin = bpy.data.objects.new("Twin", mesh)
     bpy.context.scene.collection.objects.link(twin)
     labels = stripes(mesh)

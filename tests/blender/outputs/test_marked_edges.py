@@ -1,4 +1,4 @@
-"""Edges that the artist has marked: which polygons lie beside them, and that borders move there."""
+"""Edges that the artist has marked: the polygons on their two sides, and borders that snap to them."""
 
 import bpy
 import numpy as np
@@ -61,7 +61,7 @@ def test_several_kinds_together(marked):
     assert pairs(marked) == {(0, 1), (1, 2), (2, 3)}
 
 
-def test_no_kinds_are_no_marks(marked):
+def test_without_kinds_there_are_no_pairs(marked):
     assert marked_pairs(Character((marked,)), set()) is None
 
 
@@ -69,7 +69,7 @@ def test_unmarked_mesh_has_no_pairs():
     assert pairs(strip()) == set()
 
 
-def test_mark_at_the_rim_has_no_second_side():
+def test_a_mark_on_an_open_border_has_no_pair():
     obj = strip()
     for edge in obj.data.edges:
         edge.use_seam = len([p for p in obj.data.polygons if edge.key in p.edge_keys]) == 1
@@ -95,12 +95,12 @@ def test_all_polygons_at_an_edge_of_three_are_neighbors():
     assert pairs(fan) == {(0, 1), (0, 2), (1, 2)}
 
 
-def test_materials_of_segments_are_no_mark(marked):
+def test_materials_of_segments_are_not_marks(marked):
     write_labels(marked.data, np.array([0, 1, 1, 1]), OutputOptions(materials=True))
     assert pairs(marked, kinds={"materials"}) == {(2, 3)}
 
 
-def test_mesh_whose_polygons_all_lie_at_one_place_is_read():
+def test_a_mesh_with_all_polygons_at_one_place_is_read():
     heap = mesh_object(np.zeros((300, 3)), np.arange(300).reshape(100, 3))
     for edge in heap.data.edges:
         edge.use_seam = True

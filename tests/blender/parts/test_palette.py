@@ -1,4 +1,4 @@
-"""Colors: the same for a segment whatever the number of segments, and clearly different to the eye."""
+"""Colors: the same for a segment whatever the number of segments, and clearly different for people."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from wks_segment.blender.parts import palette as module
 from wks_segment.blender.parts.palette import MAX_COLORS, colors_of, oklab, palette, sided_palette
 
 
-def test_first_colors_do_not_depend_on_how_many_there_are(monkeypatch):
+def test_first_colors_do_not_depend_on_the_number_of_colors(monkeypatch):
     few = module.palette.__wrapped__()
     monkeypatch.setattr(module, "MAX_COLORS", 12)
     np.testing.assert_array_equal(module.palette.__wrapped__(), few[:12])
@@ -85,7 +85,7 @@ BLINDNESS = {
     "without green": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
     "without blue": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
 }
-"""Machado, Oliveira and Fernandes (2009), severity 1: what who lacks a kind of cones sees, in linear light."""
+"""Machado, Oliveira and Fernandes (2009), severity 1: linear RGB as people without one kind of cones see it."""
 
 
 def as_seen(srgb, eyes):
@@ -114,7 +114,7 @@ def test_color_blind_safe_colors_of_sides_are_told_apart(eyes):
 
 
 def test_the_calm_palette_is_not_color_blind_safe():
-    """Else there would be no need of another."""
+    """Otherwise the color-blind safe palette would not be needed."""
     assert min(closest(as_seen(palette()[:8], eyes)) for eyes in BLINDNESS.values()) < 0.06
 
 

@@ -1,4 +1,4 @@
-"""Whatever the mesh of an object: the operators finish, or refuse with a reason and leave everything as it was."""
+"""On any mesh, the operators finish, or refuse with a reason and change nothing."""
 
 import bpy
 import numpy as np
@@ -40,7 +40,7 @@ def ended(operator):
 
 @pytest.mark.parametrize("action", ["learn", "apply"])
 @given(drawn=any_mesh())
-def test_operators_end_or_refuse_and_clear_gives_everything_back(model_file, action, drawn):
+def test_operators_finish_or_refuse_and_clear_restores_everything(model_file, action, drawn):
     vertices, faces, names = drawn
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     settings = bpy.context.scene.wks_segment

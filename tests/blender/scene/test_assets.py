@@ -1,4 +1,4 @@
-"""Blender's own ways of having a mesh, or of not quite having one: worked on, or refused with a reason."""
+"""Objects of all kinds that Blender has: segmented, or refused with a reason."""
 
 import bpy
 import numpy as np
@@ -41,7 +41,7 @@ def add(data, name="Thing"):
     return obj
 
 
-# What is no mesh
+# Objects that are not meshes
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def add(data, name="Thing"):
         (lambda: bpy.data.metaballs.new("Thing"), "metaball"),
     ],
 )
-def test_what_a_mesh_can_be_made_of_is_named(make, called):
+def test_a_type_that_can_be_converted_is_named(make, called):
     add(make())
     assert f'"Thing" is a {called}: convert it first (Object > Convert > Mesh)' in reason(OPS.learn)
 
@@ -75,7 +75,7 @@ def test_an_instance_of_a_collection_is_named():
     assert '"Copy" is an instance: make it real first' in reason(OPS.learn)
 
 
-def test_geometry_nodes_that_leave_instances_only_are_explained():
+def test_geometry_nodes_that_give_only_instances_are_explained():
     obj = limbed("Scattered")
     tree = bpy.data.node_groups.new("Nodes", "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
@@ -96,7 +96,7 @@ def test_an_object_of_edges_only_has_no_faces():
     assert '"Wire" has no faces' in reason(OPS.learn)
 
 
-# What is another's
+# Shared and linked data
 
 
 def test_a_library_override_shares_its_mesh_with_the_library(tmp_path):
@@ -122,7 +122,7 @@ def test_two_objects_of_one_mesh_get_their_labels_once():
     assert len(np.unique(labels_of(first))) > 1
 
 
-def test_materials_that_other_objects_use_too_stay_as_they_are():
+def test_materials_that_other_objects_use_stay_as_they_are():
     first, other = limbed("First"), limbed("Other")
     shared = bpy.data.materials.new("Shared")
     for obj in (first, other):
@@ -139,7 +139,7 @@ def test_materials_that_other_objects_use_too_stay_as_they_are():
 # States of an object
 
 
-def test_hidden_faces_are_labeled_too_and_stay_hidden():
+def test_hidden_faces_are_labeled_and_stay_hidden():
     obj = limbed()
     hidden = np.zeros(len(obj.data.polygons), dtype=bool)
     hidden[::3] = True
@@ -152,7 +152,7 @@ def test_hidden_faces_are_labeled_too_and_stay_hidden():
     np.testing.assert_array_equal(now, hidden)
 
 
-def test_edit_mode_of_another_object_is_refused_too():
+def test_edit_mode_of_another_selected_object_is_refused():
     first, second = limbed_poses(*BENDS)
     select(first, second)
     bpy.ops.object.mode_set(mode="EDIT")
@@ -161,7 +161,7 @@ def test_edit_mode_of_another_object_is_refused_too():
 
 
 @pytest.mark.parametrize("scale", [(-1, 1, 1), (2, 0.5, 1), (1e-6, 1e-6, 1e-6), (1e6, 1e6, 1e6)])
-def test_object_scale_does_not_disturb(scale):
+def test_object_scale_changes_no_labels(scale):
     plain, scaled = limbed("Plain"), limbed("Scaled")
     scaled.scale = scale
     select(plain)
@@ -191,10 +191,10 @@ def test_four_faces_are_enough():
     assert set(labels_of(obj)) <= {0, 1}
 
 
-# Loose parts
+# Islands
 
 
-def test_loose_parts_are_tied_as_they_are_in_rest():
+def test_islands_are_connected_as_in_the_rest_position():
     body, eye = limbed("Body"), limbed("Eye", subdivisions=3)
     eye.data.transform(Matrix.Scale(0.1, 4))
     eye.data.transform(Matrix.Translation((3.4, 0, 0.8)))
@@ -211,7 +211,7 @@ def test_loose_parts_are_tied_as_they_are_in_rest():
 # Limits
 
 
-def test_a_job_above_the_limit_is_refused_without_a_window_and_says_how_large_it_is():
+def test_a_job_above_the_limit_is_refused_with_an_estimate():
     settings = bpy.context.scene.wks_segment
     settings.limit_minutes, settings.n_eigenpairs = 0.1, 1000
     select(*limbed_poses(0.0, 0.1, 0.2, 0.3, 0.4, 0.5))

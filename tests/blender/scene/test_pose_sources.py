@@ -1,4 +1,4 @@
-"""Poses from markers, from a pose library, from caches: what is read, and that the scene comes back as it was."""
+"""Poses from markers, pose libraries and caches: what is read, and that the scene is restored."""
 
 import bpy
 import numpy as np
@@ -26,7 +26,7 @@ def height(pose):
 
 
 def pose_action(armature, name, bend, asset=True, frames=(1,)):
-    """An action that bends the limb by an angle at frames, in the file and on nothing."""
+    """An action that bends the limb by an angle at frames; it is in the file, and no object uses it."""
     data = armature.animation_data
     before, slot = data.action, getattr(data, "action_slot", None)
     pose = armature.pose.bones["limb"].rotation_euler.copy()
@@ -78,14 +78,14 @@ def test_markers_are_the_poses(settings):
     assert all(path.startswith(("/meshes/Walker/", "/model", "/segments")) for path in changed), changed
 
 
-def test_of_many_markers_some_are_taken_evenly():
+def test_the_number_of_markers_is_limited_evenly():
     obj = limbed_rigged()
     marked(*range(1, 22, 2), 5)
     names = [pose.name for pose in reader.read_markers(bpy.context, Character((obj,)), 3)]
     assert names == ["Walker, Mark 1", "Walker, Mark 11", "Walker, Mark 21"]
 
 
-def test_no_markers_are_named(settings):
+def test_missing_markers_are_named(settings):
     settings.source = "MARKERS"
     select(limbed_rigged())
     with pytest.raises(RuntimeError, match="no markers in the timeline"):
@@ -114,7 +114,7 @@ def test_without_assets_the_middles_of_actions_are_the_poses(library):
 
 
 @pytest.mark.parametrize("moved_by", ["action", "nothing"])
-def test_the_armature_comes_back_as_it_was(library, settings, moved_by):
+def test_the_armature_is_restored(library, settings, moved_by):
     armature = library.parent
     if moved_by == "nothing":
         armature.animation_data.action = None
@@ -136,7 +136,7 @@ def test_the_armature_comes_back_as_it_was(library, settings, moved_by):
     np.testing.assert_array_equal(after.mesh.vertices, seen.mesh.vertices)
 
 
-def test_it_comes_back_after_an_error_too(library, settings):
+def test_the_armature_is_restored_after_an_error(library, settings):
     library.data.vertices[3].co.x = float("nan")
     library.data.update()
     settings.source = "ACTIONS"
@@ -146,7 +146,7 @@ def test_it_comes_back_after_an_error_too(library, settings):
     assert not changes(before, scene_snapshot())
 
 
-def test_no_pose_library_is_named(settings):
+def test_a_missing_pose_library_is_named(settings):
     settings.source = "ACTIONS"
     select(limbed())
     with pytest.raises(RuntimeError, match='"Limbed" has no armature'):

@@ -85,11 +85,11 @@ RECIPES = {
         "Calm", "Clearly different and easy on the eye: shading stays readable on all of them", LIGHTNESS, CHROMA
     ),
     "maximal": Recipe(
-        "Maximally Different", "As far from each other as a screen can show, from dark to bright, neon among them",
+        "Maximally Different", "As different as a screen can show, from dark to bright, with neon colors",
         (0.30, 0.97), (0.06, 0.40),
     ),
     "color_blind": Recipe(
-        "Color-Blind Safe", "Told apart without the cones for red, for green or for blue as well, by lightness too",
+        "Color-Blind Safe", "Can be told apart with every kind of color blindness, partly by lightness",
         (0.25, 0.97), (0.04, 0.40), (0.66, 0.97), (0.25, 0.60), radians(90), color_blind=True,
     ),
 }  # fmt: skip
