@@ -249,7 +249,7 @@ def test_changed_scene_ends_the_job(poses, hold_at, happens, reason, stage):
     assert ran.step(bpy.context) == RUNNING
     go_on()
     assert finish_job(ran) == {"CANCELLED"}
-    message = f"Learn and Segment was finish_job, nothing is written: {reason}"
+    message = f"Learn and Segment was ended, nothing is written: {reason}"
     assert ran.reported == [("WARNING", message)]
     assert job_holder(bpy.context).message == message
     assert not changes(after, scene_snapshot())
