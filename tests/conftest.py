@@ -31,6 +31,7 @@ class LinePerFile:
         self.n_tests = self.n_ended = 0
         self.seconds = Counter()
         self.outcomes = {}
+        self.reasons = {}
 
     def begin(self, ids):
         """All tests are known."""
@@ -56,6 +57,8 @@ class LinePerFile:
         self.seconds[name] += report.duration
         if outcome:
             self.outcomes.setdefault(name, Counter())[outcome] += 1
+        if outcome == "skipped":
+            self.reasons.setdefault(name, {})[report.longrepr[2].removeprefix("Skipped: ")] = None
         if report.failed:
             self.terminal.write_line(f"{outcome.upper()} {report.nodeid}", red=True)
         if report.when == "teardown":
@@ -67,7 +70,8 @@ class LinePerFile:
     def tell(self, name):
         counts = ", ".join(f"{count} {kind}" for kind, count in self.outcomes[name].items())
         share = self.n_ended / self.n_tests
-        self.terminal.write_line(f"[{share:4.0%}] {name}: {counts} in {self.seconds[name]:.1f} s")
+        why = f" ({'; '.join(self.reasons[name])})" if name in self.reasons else ""
+        self.terminal.write_line(f"[{share:4.0%}] {name}: {counts}{why} in {self.seconds[name]:.1f} s")
 
 
 def outcome_of(report):

@@ -7,6 +7,8 @@ from wks_segment.core.mesh.adjacency import FaceAdjacency, connected_regions
 
 SMALL = {"n_segments": 4, "n_eigenpairs": 60}
 POSES = [creature(bend) for bend in (0.0, 0.4, 0.8)]
+COARSE = [creature(bend, 3) for bend in (0.0, 0.4, 0.8)]
+"""For what does not depend on how fine a mesh is."""
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +84,7 @@ def test_with_the_paper_preset_regions_are_connected_regions_of_components():
 
 def test_limb_and_body_are_different_segments(model):
     labels = model.predict(POSES[0])
-    tip = labels[np.argmax(POSES[0].vertices[:, 0])]
+    tip = labels[np.argmax(POSES[0].vertices[:, 2])]
     body = labels[np.argmin(np.abs(POSES[0].vertices - (0, 0, -1)).sum(axis=1))]
     assert tip != body
 
@@ -99,8 +101,13 @@ def test_shape_scores_highest_with_the_model_of_its_class(model):
 
 @pytest.mark.parametrize("covariance_type", ["auto", "shared", "diag", "spherical", "tied", "full"])
 @pytest.mark.parametrize("scaling", ["log", "raw"])
+<<<<<<< Updated upstream
 def test_every_setting_can_be_learned_and_saved(tmp_path, model, covariance_type, scaling):
     described = [model.describe(pose) for pose in POSES[:2]]
+=======
+def test_every_setting_learns_and_survives_saving(tmp_path, model, covariance_type, scaling):
+    described = [model.describe(pose) for pose in COARSE[:2]]
+>>>>>>> Stashed changes
     fitted = PoseSegmentation(**SMALL, covariance_type=covariance_type, scaling=scaling).fit(described)
     fitted.save(tmp_path / "model.json")
     loaded = PoseSegmentation.load(tmp_path / "model.json")
@@ -155,7 +162,7 @@ def test_polygons_of_several_triangles_are_labeled_over_all_poses(model):
 
 def test_progress_rises_to_one():
     seen = []
-    PoseSegmentation(**SMALL).fit(POSES[:2], progress=lambda stage, fraction: seen.append((stage, fraction)))
+    PoseSegmentation(**SMALL).fit(COARSE[:2], progress=lambda stage, fraction: seen.append((stage, fraction)))
     fractions = [fraction for _, fraction in seen]
     assert fractions == sorted(fractions)
     assert fractions[-1] == 1.0
@@ -179,7 +186,7 @@ def test_error_from_progress_ends_a_fit_within_a_stage(stage):
 
     learner = PoseSegmentation(**SMALL)
     with pytest.raises(StopError):
-        learner.fit(POSES, progress=progress)
+        learner.fit(COARSE, progress=progress)
     assert len(calls) == 3
     assert not hasattr(learner, "regions_") or learner.regions_ is None
 
