@@ -101,13 +101,8 @@ def test_shape_scores_highest_with_the_model_of_its_class(model):
 
 @pytest.mark.parametrize("covariance_type", ["auto", "shared", "diag", "spherical", "tied", "full"])
 @pytest.mark.parametrize("scaling", ["log", "raw"])
-<<<<<<< Updated upstream
 def test_every_setting_can_be_learned_and_saved(tmp_path, model, covariance_type, scaling):
-    described = [model.describe(pose) for pose in POSES[:2]]
-=======
-def test_every_setting_learns_and_survives_saving(tmp_path, model, covariance_type, scaling):
     described = [model.describe(pose) for pose in COARSE[:2]]
->>>>>>> Stashed changes
     fitted = PoseSegmentation(**SMALL, covariance_type=covariance_type, scaling=scaling).fit(described)
     fitted.save(tmp_path / "model.json")
     loaded = PoseSegmentation.load(tmp_path / "model.json")

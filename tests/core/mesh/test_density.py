@@ -66,9 +66,8 @@ def test_a_mesh_that_is_finer_on_one_side_gets_the_same_labels(model, axis, roun
 
 
 def test_a_model_of_meshes_that_are_finer_on_one_side_labels_both_alike():
-    poses = [finer_on_one_side(figure(*bend, subdivisions=3), rounds=2)[0] for bend in BENDS]
-    uneven = PoseSegmentation(**SMALL).fit(poses)
-    mesh = figure(*UNSEEN, subdivisions=3)
+    uneven = PoseSegmentation(**SMALL).fit([finer_on_one_side(figure(*bend), rounds=2)[0] for bend in BENDS])
+    mesh = figure(*UNSEEN)
     expected = uneven.segment_faces(mesh)
     assert len(np.unique(expected)) == SMALL["n_segments"]
     finer, owner = finer_on_one_side(mesh, rounds=2)
