@@ -65,7 +65,7 @@ def test_apply_without_an_output(command, folder, model):
         (None, "no such file"),
         (b"{}", "not a model of WKS Segment"),
         (b"\x80\x04\x95\xff", "binary"),
-        (b"hello", "no JSON"),
+        (b"hello", "not JSON"),
     ],
 )
 def test_unreadable_or_foreign_model_file(command, folder, tmp_path, content, words):

@@ -54,11 +54,11 @@ def test_model_path_may_be_relative_to_the_blend_file(learned, tmp_path):
     ("content", "match"),
     [
         (b"{}", "not a model of WKS Segment"),
-        (b"[1, 2", "no JSON"),
+        (b"[1, 2", "not JSON"),
         (b"\x80\x04\x95\xff", "binary file"),
         (b'{"format": "wks_segment model", "version": 99}', "version 99"),
         (b'{"format": "wks_segment model", "version": 4, "parameters": {}}', "damaged"),
-        (b"", "no JSON"),
+        (b"", "not JSON"),
     ],
 )
 def test_foreign_model_file_is_refused(learned, tmp_path, content, match):

@@ -228,7 +228,7 @@ def redone():
         (moved, 'the mesh of "Pose 1" was edited'),
         (turned, 'the mesh of "Pose 1" was edited'),
         (grown, 'the mesh of "Pose 1" was edited'),
-        (exchanged, '"Pose 1" got another mesh'),
+        (exchanged, '"Pose 1" has another mesh now'),
         (edited, '"Pose 1" went into Edit Mode'),
         (sculpted, '"Pose 1" went into Sculpt Mode'),
         (without_its_scene, 'the scene "Scene" was deleted'),

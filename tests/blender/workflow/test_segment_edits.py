@@ -58,7 +58,7 @@ def test_merging_needs_another_segment_of_the_list(pair, settings):
     activate(settings, 1)
     before = scene_snapshot()
     for into in (-1, 1, 7):
-        with pytest.raises(RuntimeError, match="Choose another segment of the list"):
+        with pytest.raises(RuntimeError, match="Choose another segment to merge"):
             OPS.merge_segments("EXEC_DEFAULT", into=into)
     assert not changes(before, scene_snapshot())
 
