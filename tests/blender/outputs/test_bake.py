@@ -375,7 +375,7 @@ def test_command_without_segments_or_model_is_refused(command, tmp_path):
     unwrapped(limbed())
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "plain.blend"))
     done = command("bake", tmp_path / "plain.blend", "--output", tmp_path / "map.png")
-    assert (done.code, "give the --model" in done.err) == (1, True)
+    assert (done.code, "with --model" in done.err) == (1, True)
     done = command("bake", tmp_path / "plain.blend", "--output", tmp_path / "map.jpg")
     assert (done.code, ".png" in done.err) == (1, True)
     assert [path.name for path in tmp_path.iterdir()] == ["plain.blend"]

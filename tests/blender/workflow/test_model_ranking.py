@@ -183,7 +183,7 @@ def test_rank_a_file(command, folder, tmp_path):
         ((), 2, "give FILE and --models DIR, or --evaluate DIR"),
         (("a.obj",), 2, "give FILE and --models DIR"),
         (("a.obj", "--evaluate", "."), 2, "neither FILE nor --models"),
-        (("--evaluate", ".", "--frames", "1:20:5"), 2, "a COUNT only"),
+        (("--evaluate", ".", "--frames", "1:20:5"), 2, "takes only a COUNT"),
         (("--evaluate", "missing"), 1, "missing: there is no such folder"),
         (("a.obj", "--models", "missing"), 1, "missing: there is no such folder"),
         (("a.obj", "--models", "."), 1, "no model in this folder that can be used"),
