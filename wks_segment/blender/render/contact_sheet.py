@@ -35,7 +35,7 @@ CAPTION_COLOR = (0.05, 0.05, 0.05)
 """sRGB of captions."""
 NO_PART_COLOR = 0.6
 """sRGB gray value of triangles that belong to no polygon of the character's own mesh."""
-COLOR_ATTRIBUTE = "color"
+PICTURE_COLORS = "color"
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ def paint(mesh: bpy.types.Mesh, srgb: FloatArray) -> None:
     """Set the color of each corner of a mesh; srgb is an array (corners, 3)."""
     colors = np.ones((len(mesh.loops), 4), dtype=np.float32)
     colors[:, :3] = srgb
-    attribute = mesh.color_attributes.new(COLOR_ATTRIBUTE, "BYTE_COLOR", "CORNER")
+    attribute = mesh.color_attributes.new(PICTURE_COLORS, "BYTE_COLOR", "CORNER")
     write_attribute(attribute, colors)
     mesh.color_attributes.active_color = attribute
 

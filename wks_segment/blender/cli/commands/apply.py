@@ -16,7 +16,7 @@ from ...workflow import model_library, pipeline
 from ...workflow.model_ranking import NamedModel, largest, rank_poses, verdict_message
 from ...workflow.pipeline import Run
 from ...workflow.report import Report
-from ..options import (
+from ..command_options import (
     add_labeling_settings,
     add_model,
     add_outputs,

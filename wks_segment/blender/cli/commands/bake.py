@@ -22,7 +22,7 @@ from ...scene.poses import Pose
 from ...workflow import model_library, pipeline
 from ...workflow.pipeline import LabelRequest, Run
 from ...workflow.report import Report
-from ..options import BAKE_OPTIONS, add_labeling_settings, add_object, add_settings, settings_from
+from ..command_options import BAKE_OPTIONS, add_labeling_settings, add_object, add_settings, settings_from
 from ..reading import read_poses
 from ..results import check_picture, result_of
 

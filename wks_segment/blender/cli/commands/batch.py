@@ -28,8 +28,7 @@ from ....batch import (
 from ....core.progress import Progress
 from ...errors import UserError
 from ...scene import file_formats
-from ..option_types import batch_part, number_within
-from ..options import (
+from ..command_options import (
     add_cache,
     add_labeling_settings,
     add_model,
@@ -38,6 +37,7 @@ from ..options import (
     add_settings,
     to_arguments,
 )
+from ..option_types import batch_part, number_within
 
 TIME_LIMIT = 3600.0
 """Default of the seconds that a file may take."""

@@ -14,8 +14,8 @@ from ...scene import file_formats
 from ...scene.characters import Character
 from ...workflow.pipeline import Run
 from ...workflow.report import Report
+from ..command_options import OUTPUT_OPTIONS, SEGMENTATION_OPTIONS, add_settings, settings_from
 from ..demo_scene import Demo, creature_in
-from ..options import OUTPUT_OPTIONS, SEGMENTATION_OPTIONS, add_settings, settings_from
 from ..reading import characters_in, set_action
 
 

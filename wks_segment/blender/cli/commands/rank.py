@@ -15,8 +15,8 @@ from ...workflow.model_ranking import NamedModel, largest, rank_poses, verdict_m
 from ...workflow.pipeline import Run
 from ...workflow.report import Report
 from ...workflow.retrieval import evaluate
+from ..command_options import add_poses, add_resources, add_settings, cache_from, settings_from
 from ..option_types import number_within
-from ..options import add_poses, add_resources, add_settings, cache_from, settings_from
 from ..reading import read_models, read_poses
 from ..results import check_picture, rounded_seconds, warnings_and_files
 from ..terminal import table

@@ -11,7 +11,7 @@ from ...scene import file_formats
 from ...workflow import model_library, pipeline
 from ...workflow.pipeline import Run
 from ...workflow.report import Report, pose_warnings, segment_warnings
-from ..options import add_outputs, add_poses, add_resources, add_settings, cache_from, settings_from
+from ..command_options import add_outputs, add_poses, add_resources, add_settings, cache_from, settings_from
 from ..reading import read_poses
 from ..results import check_outputs, label_and_write, result_of, save_model
 
