@@ -101,12 +101,12 @@ def bake_id_maps(
         if not has_uvs(obj.data):
             write_uv_map(obj.data, project(context, obj.data))
         layer = _Layer([obj], bake_parts(context, obj, options.size, warnings))
-        beside = next((other for other in layers if _is_beside(layer.covered, other.covered)), None)
-        if beside is None:
+        shared = next((other for other in layers if _are_disjoint(layer.covered, other.covered)), None)
+        if shared is None:
             layers.append(layer)
         else:
-            beside.objects.append(obj)
-            beside.part_map = np.where(beside.covered, beside.part_map, layer.part_map)
+            shared.objects.append(obj)
+            shared.part_map = np.where(shared.covered, shared.part_map, layer.part_map)
     maps = []
     for layer in layers:
         name = IMAGE_NAME.format(character.name if len(layers) == 1 else layer.objects[0].name)
@@ -187,7 +187,7 @@ def bake_parts(context: bpy.types.Context, obj: bpy.types.Object, size: int, war
     return part_map
 
 
-def _is_beside(first: BoolArray, second: BoolArray) -> bool:
+def _are_disjoint(first: BoolArray, second: BoolArray) -> bool:
     """Whether two (size, size) masks of covered pixels share no or hardly any pixels."""
     both = np.count_nonzero(first & second)
     return bool(both <= MOST_SHARED * min(np.count_nonzero(first), np.count_nonzero(second)))

@@ -13,7 +13,7 @@ from .ledger import Ledger
 from .output import PartsOfMesh
 from .part_attributes import labels_on
 
-COLOR_ATTRIBUTE = "wks_segment_color"
+PART_COLORS = "wks_segment_color"
 
 
 class ColorAttribute:
@@ -26,7 +26,7 @@ class ColorAttribute:
         active = mesh.color_attributes.active_color
         ledger["active_color"] = active.name if active is not None else ""
         # On corners, since Blender does not show colors of faces, and colors of vertices would blend.
-        attribute = mesh.color_attributes.new(free_name(mesh, COLOR_ATTRIBUTE), "BYTE_COLOR", "CORNER")
+        attribute = mesh.color_attributes.new(free_name(mesh, PART_COLORS), "BYTE_COLOR", "CORNER")
         ledger["colors"] = attribute.name
         colors = np.ones((len(mesh.loops), 4), dtype=np.float32)
         colors[:, :3] = parts.options.style.colors_of(at_corners(mesh, parts.labels))

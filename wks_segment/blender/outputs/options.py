@@ -1,4 +1,4 @@
-"""What is written to meshes beside the numbers of parts."""
+"""What is written to meshes in addition to the numbers of parts."""
 
 from __future__ import annotations
 

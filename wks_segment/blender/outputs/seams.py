@@ -17,7 +17,7 @@ SEAM_ATTRIBUTES = ("uv_seam", ".uv_seam")
 
 
 class Seams:
-    """Seams on the edges between polygons of different parts, beside the artist's own seams."""
+    """Seams on the edges between polygons of different parts, in addition to the artist's own seams."""
 
     def write(self, mesh: bpy.types.Mesh, parts: PartsOfMesh, ledger: Ledger) -> None:
         """Mark the edges between polygons of different parts, if the options ask for seams."""

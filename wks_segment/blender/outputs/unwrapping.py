@@ -37,7 +37,7 @@ UNWRAP_METHODS = (
     (ALONG_SEAMS, "Along Seams", "Cut only at seams. A segment that is closed, or a long tube, needs some"),
     (SMART_PROJECT, "Smart Project", "Cut where the surface turns, as Smart UV Project does"),
 )
-"""Where islands are cut beside the borders of segments, as items of an enum property."""
+"""Where islands are cut in addition to the borders of segments, as items of an enum property."""
 
 
 def unwrap_parts(context: bpy.types.Context, mesh: bpy.types.Mesh, labels: IntArray, method: str) -> FloatArray:

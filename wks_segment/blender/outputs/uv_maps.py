@@ -1,4 +1,4 @@
-"""A UV map of ours beside the artist's own."""
+"""A UV map of ours in addition to the artist's own."""
 
 from __future__ import annotations
 

@@ -13,8 +13,8 @@ from .ledger import Ledger
 from .output import PartsOfMesh
 
 GROUP_NAME = "WKS {}"
-"""Name of the group of a part. Not the part's name alone: vertex groups share their names with attributes, and bones
-would move the vertices of a group with their name."""
+"""Name of the group of a part. Not the part's name alone: a vertex group and an attribute cannot have the same name,
+and an armature moves the vertices of a group that has the name of a bone."""
 
 
 class VertexGroups:

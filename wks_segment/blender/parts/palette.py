@@ -89,7 +89,7 @@ RECIPES = {
         (0.30, 0.97), (0.06, 0.40),
     ),
     "color_blind": Recipe(
-        "Color-Blind Safe", "Can be told apart with every kind of color blindness, partly by lightness",
+        "Color-Blind Safe", "Can be told apart by people without cones for red, green or blue, partly by lightness",
         (0.25, 0.97), (0.04, 0.40), (0.66, 0.97), (0.25, 0.60), radians(90), color_blind=True,
     ),
 }  # fmt: skip

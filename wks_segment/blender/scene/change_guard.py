@@ -18,7 +18,7 @@ class Watch:
 
     def __init__(self, scene: bpy.types.Scene, characters: Iterable[Character]) -> None:
         self._scene = scene.name, scene.session_uid
-        objects = {member: member.found() for character in characters for member in character.members}
+        objects = {member: member.resolve() for character in characters for member in character.members}
         self._states = {
             member: (_mesh_state(obj), _content(obj.data)) for member, obj in objects.items() if obj is not None
         }
@@ -27,13 +27,13 @@ class Watch:
         """Raise ChangedError if a change can be seen without reading meshes: fast enough for many times a second."""
         self.scene()
         for member, (state, _) in self._states.items():
-            _check_member(member, member.found(), state)
+            _check_member(member, member.resolve(), state)
 
     def look(self) -> None:
         """Raise ChangedError also if coordinates or faces changed: slower, for once before something is written."""
         self.glance()
         for member, (_, content) in self._states.items():
-            obj = member.found()
+            obj = member.resolve()
             if obj is not None and _content(obj.data) != content:
                 raise ChangedError('the mesh of "{name}" was edited', name=member.name)
 

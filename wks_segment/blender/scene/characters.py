@@ -25,7 +25,7 @@ class Member:
     uid: int
     mesh_uid: int
 
-    def found(self) -> bpy.types.Object | None:
+    def resolve(self) -> bpy.types.Object | None:
         """The object, also if it was renamed; None if it was deleted or has no mesh any more."""
         obj = bpy.data.objects.get(self.name)
         if obj is None or obj.session_uid != self.uid:
@@ -65,11 +65,11 @@ class Character:
         UserError
             If one was deleted.
         """
-        found = {member.name: member.found() for member in self.members}
-        missing = [name for name, obj in found.items() if obj is None]
+        objects = {member.name: member.resolve() for member in self.members}
+        missing = [name for name, obj in objects.items() if obj is None]
         if missing:
             raise UserError("{names} does not exist any more", names=quoted(missing))
-        return tuple(found.values())
+        return tuple(objects.values())
 
     @property
     def meshes(self) -> tuple[int, ...]:

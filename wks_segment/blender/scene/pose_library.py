@@ -29,7 +29,7 @@ def read_actions(context: bpy.types.Context, character: Character, count: int) -
     UserError
         If the character has no armature, or no action in the file moves a bone of it.
     """
-    armature = next((found for found in map(armature_of, character.objects) if found is not None), None)
+    armature = next((rig for rig in map(armature_of, character.objects) if rig is not None), None)
     if armature is None:
         raise UserError(
             '"{name}" has no armature that a pose could move: take poses from elsewhere', name=character.name
@@ -62,8 +62,8 @@ def _bones(action: bpy.types.Action) -> set[str]:
     else:
         bags = (bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags)
         curves = [curve for bag in bags for curve in bag.fcurves]
-    found = (BONE.match(curve.data_path) for curve in curves)
-    return {bpy.utils.unescape_identifier(match[1]) for match in found if match is not None}
+    matches = (BONE.match(curve.data_path) for curve in curves)
+    return {bpy.utils.unescape_identifier(match[1]) for match in matches if match is not None}
 
 
 @contextmanager

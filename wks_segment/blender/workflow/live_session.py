@@ -257,7 +257,7 @@ class Session:
         self.withdraw()
         if self.job is None:
             return
-        if any(member.found() is None for pose in self.job.poses for member in pose.character.members):
+        if any(member.resolve() is None for pose in self.job.poses for member in pose.character.members):
             self.drop()
             return
         scene = bpy.context.scene

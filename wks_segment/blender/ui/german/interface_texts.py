@@ -154,7 +154,7 @@ GERMAN_INTERFACE = {
     "Maximally Different": "Möglichst verschieden",
     "As different as a screen can show, from dark to bright, with neon colors": "So weit voneinander, wie ein Bildschirm es zeigt, von dunkel bis hell, auch Neon",
     "Color-Blind Safe": "Für Farbenblinde",
-    "Can be told apart with every kind of color blindness, partly by lightness": "Auch ohne die Zapfen für Rot, Grün oder Blau zu unterscheiden, auch durch Helligkeit",
+    "Can be told apart by people without cones for red, green or blue, partly by lightness": "Auch ohne die Zapfen für Rot, Grün oder Blau zu unterscheiden, auch durch Helligkeit",
     "Vertex Groups": "Vertexgruppen",
     "Write a vertex group for each segment, in addition to the object's own groups": "Eine Vertexgruppe für jedes Segment schreiben, zusätzlich zu den eigenen des Objekts",
     "None": "Keine",
