@@ -49,7 +49,7 @@ def holes(
     centers = mesh.vertices[mesh.faces].mean(axis=1)
     for face in generator.choice(mesh.n_faces, round(strength), p=mesh.face_areas / mesh.area):
         kept &= np.linalg.norm(centers - centers[face], axis=1) > radius * _diagonal(mesh)
-    return _of_faces(mesh, mesh.faces[kept]), np.flatnonzero(kept)
+    return _with_faces(mesh, mesh.faces[kept]), np.flatnonzero(kept)
 
 
 def glued(mesh: TriangleMesh, strength: float, generator: np.random.Generator) -> Perturbed:
@@ -77,12 +77,12 @@ def sampling(mesh: TriangleMesh, strength: float, generator: np.random.Generator
     obj = bpy.data.objects.new("sampled", data)
     bpy.context.collection.objects.link(obj)
     obj.modifiers.new("Decimate", "DECIMATE").ratio = 1 / strength
-    seen = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    seen.calc_loop_triangles()
-    vertices = np.empty(3 * len(seen.vertices), dtype=np.float32)
-    seen.vertices.foreach_get("co", vertices)
-    faces = np.empty(3 * len(seen.loop_triangles), dtype=np.int32)
-    seen.loop_triangles.foreach_get("vertices", faces)
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    evaluated.calc_loop_triangles()
+    vertices = np.empty(3 * len(evaluated.vertices), dtype=np.float32)
+    evaluated.vertices.foreach_get("co", vertices)
+    faces = np.empty(3 * len(evaluated.loop_triangles), dtype=np.int32)
+    evaluated.loop_triangles.foreach_get("vertices", faces)
     bpy.data.objects.remove(obj)
     bpy.data.meshes.remove(data)
     coarse = TriangleMesh(vertices.reshape(-1, 3), faces.reshape(-1, 3))
@@ -140,7 +140,7 @@ def _vertex_normals(mesh: TriangleMesh) -> FloatArray:
     return normals / np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
 
 
-def _of_faces(mesh: TriangleMesh, faces: IntArray) -> TriangleMesh:
+def _with_faces(mesh: TriangleMesh, faces: IntArray) -> TriangleMesh:
     """The mesh with only some of its faces, and the vertices that they use."""
     used, compact = np.unique(faces, return_inverse=True)
     return TriangleMesh(mesh.vertices[used], compact.reshape(-1, 3))

@@ -46,8 +46,8 @@ def main(path: Path) -> None:
 def _bytes(srgb: FloatArray, eyes: FloatArray) -> list[list[int]]:
     """(n, 3) sRGB colors in 8 bits, as seen by eyes that a (3, 3) matrix on linear RGB describes."""
     light = np.clip(linear(srgb) @ eyes.T, 0, 1)
-    seen = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-    rounded: list[list[int]] = np.rint(255 * seen).astype(int).tolist()
+    perceived = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    rounded: list[list[int]] = np.rint(255 * perceived).astype(int).tolist()
     return rounded
 
 
