@@ -147,7 +147,6 @@ def test_modules_live_in_packages_by_topic(name, most):
     assert len(list((PACKAGE / name).glob("*.py"))) <= most
 
 
-@pytest.mark.xfail(strict=False, reason="the packages are being reorganized")
 def test_no_file_has_more_than_400_lines():
     """Other than tables of texts."""
     long = {
@@ -163,7 +162,6 @@ SET_BY_BLENDER = {"draw_item"}
 """Functions that Blender calls, with the parameters that it has chosen."""
 
 
-@pytest.mark.xfail(strict=False, reason="the packages are being reorganized")
 def test_no_function_has_more_than_seven_parameters():
     """Other than constructors."""
     many = [
@@ -207,7 +205,6 @@ def passes_progress_on(function):
     return False
 
 
-@pytest.mark.xfail(strict=False, reason="the packages are being reorganized")
 def test_progress_is_handed_on_by_its_class_only():
     """Neither a lambda nor an inner function rescales or renames it."""
     found = [
@@ -232,13 +229,16 @@ def constants(tree):
                     yield name.id
 
 
-@pytest.mark.xfail(strict=False, reason="the packages are being reorganized")
+SHARED_NAMES = {"CLASSES"}
+"""With one meaning: the classes of a module that Blender registers."""
+
+
 def test_public_constants_have_names_of_their_own():
     modules = defaultdict(set)
     for path, tree in trees():
         for name in constants(tree):
             modules[name].add(str(path))
-    shared = {name: sorted(paths) for name, paths in modules.items() if len(paths) > 1}
+    shared = {name: sorted(paths) for name, paths in modules.items() if len(paths) > 1 and name not in SHARED_NAMES}
     assert not shared
 
 
