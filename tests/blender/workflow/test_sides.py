@@ -13,6 +13,8 @@ from wks_segment.blender.outputs.options import OutputOptions
 from wks_segment.blender.parts import part_ids
 from wks_segment.blender.parts.palette import sided_palette
 from wks_segment.blender.scene.characters import Character
+from wks_segment.blender.workflow.pipeline import Run
+from wks_segment.blender.workflow.report import Report
 
 pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
@@ -317,8 +319,8 @@ def test_undo_restores_everything(learned):
 
 
 def test_demo_measures_sides(creature, settings, tmp_path, needs_rendering):
-    character = Character((creature,))
-    result = demo_scene.run(bpy.context, character, settings, tmp_path / "walk", 4, 1, lambda stage, share: None)
+    demo = demo_scene.Demo(Character((creature,)), tmp_path / "walk", 4, 1)
+    result = demo.run(bpy.context, settings, Run(Report([])))
     assert (result["segments"], len(result["parts"])) == (5, len(np.unique(labels_of(creature))))
     assert result["agreement"] > 0.8
     assert sides_are_right(creature)
