@@ -1,6 +1,7 @@
 """The architecture: layers of packages, what each may import, how large things are, and what no code of ours does."""
 
 import ast
+import functools
 import io
 import re
 import subprocess
@@ -41,10 +42,15 @@ LAYERS = {
 """Lowest layer first. Packages of one layer do not import each other."""
 
 
+@functools.cache
+def tree_of(path):
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def imports(path):
     """(package and module, line) of every import of ours in a file, as parts of its absolute name."""
     package = path.relative_to(PACKAGE.parent).with_suffix("").parts[:-1]
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.ImportFrom):
             base = package[: len(package) + 1 - node.level] if node.level else ()
             module = (*base, *(node.module.split(".") if node.module else ()))
@@ -115,7 +121,7 @@ def test_core_runs_without_bpy():
 
 def test_no_pickle_eval_or_swallowed_error():
     for path in PACKAGE.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(tree_of(path)):
             if isinstance(node, ast.ExceptHandler):
                 assert node.type is not None, f"{path}:{node.lineno} bare except"
                 assert not all(isinstance(s, ast.Pass) for s in node.body), f"{path}:{node.lineno} swallows an error"
@@ -128,7 +134,7 @@ def test_one_module_reads_and_writes_arrays_of_blender():
     """`foreach_get` and `foreach_set` are fast only with an array of the property's type, which the wrappers give."""
     for path in (PACKAGE / "blender").rglob("*.py"):
         if path.relative_to(PACKAGE).as_posix() != "blender/scene/attributes.py":
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            for node in ast.walk(tree_of(path)):
                 if isinstance(node, ast.Attribute):
                     assert node.attr not in {"foreach_get", "foreach_set"}, f"{path}:{node.lineno}"
 
@@ -139,7 +145,7 @@ def test_one_module_reads_and_writes_arrays_of_blender():
 def trees():
     """(path below the package, syntax tree) of every module."""
     for path in sorted(PACKAGE.rglob("*.py")):
-        yield path.relative_to(PACKAGE), ast.parse(path.read_text(encoding="utf-8"))
+        yield path.relative_to(PACKAGE), tree_of(path)
 
 
 @pytest.mark.parametrize(("name", "most"), [("core", 8), ("blender", 4)])
