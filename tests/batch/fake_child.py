@@ -1,6 +1,6 @@
 """A fake child without Blender, which starts fast: the text of an input file says what to do with it.
 
-It loads the module `worker_main` alone, without the imports of the package.
+It loads the module `child_main` alone, without the imports of the package.
 """
 
 import importlib.util
@@ -9,10 +9,10 @@ import sys
 import time
 from pathlib import Path
 
-WORKER_MAIN = Path(__file__).resolve().parents[2] / "wks_segment" / "batch" / "worker_main.py"
-spec = importlib.util.spec_from_file_location("worker_main", WORKER_MAIN)
-worker_main = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(worker_main)
+WORKER_MAIN = Path(__file__).resolve().parents[2] / "wks_segment" / "batch" / "child_main.py"
+spec = importlib.util.spec_from_file_location("child_main", WORKER_MAIN)
+child_main = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(child_main)
 calls = []
 
 
@@ -33,7 +33,7 @@ def run(arguments):
         time.sleep(60)
         del data
     if text == "refuse":
-        return worker_main.Answer(None, f"{source}: there is no mesh in this file")
+        return child_main.Answer(None, f"{source}: there is no mesh in this file")
     if text == "raise":
         raise RuntimeError("unforeseen")
     for argument in rest:
@@ -42,8 +42,8 @@ def run(arguments):
         if argument == "--beside":
             beside = next(option.partition("=")[2] for option in rest if option.startswith("--out"))
             Path(beside).with_suffix(".mtl").write_text("beside")
-    return worker_main.Answer({"segments": 3, "warnings": ["<a> warning"], "other": float("nan")})
+    return child_main.Answer({"segments": 3, "warnings": ["<a> warning"], "other": float("nan")})
 
 
 print("a greeting", flush=True)
-sys.exit(worker_main.serve(Path(sys.argv[1]), run))
+sys.exit(child_main.serve(Path(sys.argv[1]), run))

@@ -4,12 +4,12 @@ Knows nothing of Blender and does not import it: the children run the command li
 """
 
 from .batch_run import Batch, merge_logs
+from .child_main import Answer, serve
+from .child_process import CHILD_COMMAND, Program, python_program
 from .errors import BatchError
 from .inputs import find_inputs, result_names
 from .job import Job, Outcome, hash_models, job_key
 from .limits import Limits
-from .worker_main import Answer, serve
-from .worker_process import CHILD_COMMAND, Program, python_program
 
 __all__ = [
     "CHILD_COMMAND",

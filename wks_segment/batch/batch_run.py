@@ -16,12 +16,12 @@ from typing import Any
 
 from ..core.progress import Progress
 from . import local_pool
+from .child_process import Program
 from .errors import BatchError
 from .html_report import write_report
 from .job import Job, Outcome
 from .limits import Limits
 from .results_log import ResultsLog, find_logs, log_name, read_log, read_logs, write_log
-from .worker_process import Program
 
 UNFINISHED_FOLDER = ".unfinished"
 """Folder, within that of the batch, in which results are written before they are moved to their place."""
@@ -132,9 +132,8 @@ class Batch:
         """Outcome of each job as soon as it has ended, in any order."""
         if self.scheduler is None or not jobs:
             return local_pool.run_jobs(jobs, self.program, self.processes, self.limits, unfinished)
-        from . import cluster
 
-        return cluster.run_jobs(jobs, self.scheduler, self.limits, unfinished.resolve())
+        return dask_cluster.run_jobs(jobs, self.scheduler, self.limits, unfinished.resolve())
 
     def _check_requirements(self) -> None:
         if self.part is not None and self.part[0] > len(self.jobs):

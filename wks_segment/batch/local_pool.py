@@ -7,11 +7,11 @@ import threading
 from collections.abc import Generator, Sequence
 from pathlib import Path
 
-from .errors import EndedError
+from .child_process import ChildProcess, Program
+from .errors import BatchEndedError
 from .job import Job, Outcome
 from .limits import Limits
 from .run_job import run_job
-from .worker_process import ChildProcess, Program
 
 
 def run_jobs(
@@ -49,7 +49,7 @@ def run_jobs(
                 results.put(run_job(waiting.get_nowait(), child, limits.seconds, unfinished))
         except queue.Empty:
             child.close()
-        except EndedError:
+        except BatchEndedError:
             child.kill()
         except BaseException as error:
             results.put(error)

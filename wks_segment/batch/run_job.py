@@ -8,9 +8,9 @@ import tempfile
 import time
 from pathlib import Path
 
+from .child_main import Answer
+from .child_process import ChildError, ChildProcess
 from .job import Job, Outcome
-from .worker_main import Answer
-from .worker_process import ChildError, ChildProcess
 
 LOGGED_FIELDS = ("segments", "parts", "poses", "certainty", "rankings", "best", "verdict", "warnings", "notes")
 """Fields of a command's result that are logged."""
@@ -30,7 +30,7 @@ def run_job(job: Job, child: ChildProcess, seconds: float, unfinished: Path) -> 
 
     Raises
     ------
-    EndedError, BatchError
+    BatchEndedError, BatchError
         As `ChildProcess.call` does.
     """
     begun = time.monotonic()

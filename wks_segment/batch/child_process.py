@@ -21,12 +21,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .errors import BatchError, EndedError
+from .child_main import READY_FILE, Answer
+from .errors import BatchEndedError, BatchError
 from .limits import resident_memory
-from .worker_main import READY_FILE, Answer
 
 CHILD_COMMAND = "batch-child"
-"""Command of the command line that runs `worker_main.serve`."""
+"""Command of the command line that runs `child_main.serve`."""
 POLL_SECONDS = 0.05
 """Time between two checks of a child."""
 START_SECONDS = 180.0
@@ -110,7 +110,7 @@ class ChildProcess:
         ------
         ChildError
             If the child ended, by itself or because it exceeded a limit.
-        EndedError
+        BatchEndedError
             If the batch was ended meanwhile.
         BatchError
             If no child can be started at all.
@@ -169,7 +169,7 @@ class ChildProcess:
         return process
 
     def _wait_for(self, answer: Path, process: subprocess.Popen[bytes], seconds: float) -> dict[str, Any]:
-        """Content of a file that the child writes; ChildError or EndedError if it is not written."""
+        """Content of a file that the child writes; ChildError or BatchEndedError if it is not written."""
         deadline = time.monotonic() + seconds
         used_before = self._n_calls > 1
         while True:
@@ -184,7 +184,7 @@ class ChildProcess:
                 raise ChildError(reason, may_retry=used_before)
             if self.is_ended():
                 self.kill()
-                raise EndedError
+                raise BatchEndedError
             if time.monotonic() > deadline:
                 self.kill()
                 raise ChildError(f"it took more than {seconds:g} seconds and was ended; see --time-limit")

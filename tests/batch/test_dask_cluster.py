@@ -77,7 +77,7 @@ def test_nothing_is_lost_when_a_worker_dies(cluster, tmp_path, needs_bpy):
 
 
 def test_a_scheduler_that_does_not_answer_is_named(batch, monkeypatch):
-    monkeypatch.setattr("wks_segment.batch.cluster.CONNECT_SECONDS", 1)
+    monkeypatch.setattr("wks_segment.batch.dask_cluster.CONNECT_SECONDS", 1)
     with pytest.raises(BatchError, match=r"tcp://127\.0\.0\.1:9: no Dask scheduler answers"):
         batch({"a": "one"}, scheduler="tcp://127.0.0.1:9").run(Progress())
     assert batch({"a": "one"}).run(Progress())["done"] == 1
@@ -90,7 +90,7 @@ def test_without_dask_the_message_says_what_to_install(batch, monkeypatch):
 
 
 def test_a_file_on_which_several_workers_died_is_given_up(batch):
-    from wks_segment.batch.cluster import _lost
+    from wks_segment.batch.dask_cluster import _lost
 
     (job,) = batch({"a": "one"}).jobs
     worker = type("State", (), {"address": "tcp://somewhere"})()

@@ -14,11 +14,11 @@ from pathlib import Path
 
 from distributed import Client, KilledWorker, Worker, WorkerPlugin, as_completed, get_worker
 
-from .errors import BatchError, EndedError
+from .child_process import ChildProcess, python_program
+from .errors import BatchEndedError, BatchError
 from .job import Job, Outcome
 from .limits import Limits
 from .run_job import run_job
-from .worker_process import ChildProcess, python_program
 
 CONNECT_SECONDS = 10
 """Time limit for the connection to the scheduler."""
@@ -111,7 +111,7 @@ class _ChildrenPlugin(WorkerPlugin):
             child = ChildProcess(python_program(), self._memory, self._ended.is_set)
         try:
             return run_job(job, child, seconds, unfinished)
-        except EndedError:
+        except BatchEndedError:
             child.kill()
             raise
         finally:
