@@ -132,6 +132,7 @@ class Batch:
         """Outcome of each job as soon as it has ended, in any order."""
         if self.scheduler is None or not jobs:
             return local_pool.run_jobs(jobs, self.program, self.processes, self.limits, unfinished)
+        from . import dask_cluster
 
         return dask_cluster.run_jobs(jobs, self.scheduler, self.limits, unfinished.resolve())
 

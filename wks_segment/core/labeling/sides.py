@@ -1,8 +1,8 @@
 """Left and right: the side of each learned region, and of each part of a pose by the sides of its regions.
 
-The sides of learned regions are read from the mesh at rest, once. In any other pose a region has the side of the learned
-region that it is matched with: `traits` measures the handedness that tells a hand from its mirror image, `matching`
-compares it.
+The sides of learned regions are read from the mesh at rest, once. In any other pose a region has the side of the
+learned region that it is matched with: `traits` measures the handedness that tells a hand from its mirror image,
+`matching` compares it.
 """
 
 from __future__ import annotations
