@@ -49,8 +49,9 @@ class LinePerFile:
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_report_teststatus(self, report):
-        """The outcome, if it is one, and no letter."""
-        return outcome_of(report), "", ""
+        """The outcome, if it is one, no letter, and the word for the summary."""
+        outcome = outcome_of(report)
+        return outcome, "", "" if outcome == "passed" else outcome.upper()
 
     def pytest_runtest_logreport(self, report):
         name, outcome = file_of(report.nodeid), outcome_of(report)
@@ -79,7 +80,7 @@ def outcome_of(report):
     if hasattr(report, "wasxfail"):
         return "xfailed" if report.skipped else "xpassed"
     if report.failed:
-        return "error" if report.when in ("setup", "teardown") else "failed"
+        return "error" if report.when in ("collect", "setup", "teardown") else "failed"
     return report.outcome if report.when == "call" or report.skipped else ""
 
 

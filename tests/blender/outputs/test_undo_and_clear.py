@@ -17,14 +17,14 @@ OPS = bpy.ops.wks_segment
 @pytest.mark.parametrize(
     ("operator", "options"),
     [
-        (OPS.bake, {}),
-        (OPS.unwrap, {"method": "SEAMS"}),
-        (OPS.unwrap, {"method": "SMART"}),
-        (OPS.separate, {}),
-        (OPS.segments_from, {"source": "FACE_SETS"}),
-        (OPS.segments_from, {"source": "MATERIALS"}),
-        (OPS.segments_from, {"source": "VERTEX_GROUPS"}),
-        (OPS.clear, {}),
+        ("bake", {}),
+        ("unwrap", {"method": "SEAMS"}),
+        ("unwrap", {"method": "SMART"}),
+        ("separate", {}),
+        ("segments_from", {"source": "FACE_SETS"}),
+        ("segments_from", {"source": "MATERIALS"}),
+        ("segments_from", {"source": "VERTEX_GROUPS"}),
+        ("clear", {}),
     ],
     ids=str,
 )
@@ -43,7 +43,7 @@ def test_undo_restores_everything(settings, who, operator, options):
     obj.data.polygons[6].material_index = 0
     obj.vertex_groups.new(name="New").add(list(obj.data.polygons[7].vertices), 9.0, "REPLACE")
     obj.data.update()
-    done, left = undone(operator, **options)
+    done, left = undone(getattr(OPS, operator), **options)
     assert done
     assert not left
 
