@@ -215,7 +215,7 @@ def _wait_for(out: Path, count: int, process: subprocess.Popen[str]) -> None:
 
 @contextmanager
 def _cluster() -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
-    """A scheduler on this machine and two workers, which are ended afterwards; its address, and the workers."""
+    """A scheduler on this machine and two workers, which are ended afterward; its address, and the workers."""
     processes: list[subprocess.Popen[str]] = []
 
     def start(*arguments: str, until: str) -> str:

@@ -32,8 +32,8 @@ def _sphere(subdivisions):
 def limbed_surface(bend=0.0, subdivisions=4):
     """Points and triangles of a ball with three limbs, the longest of which is bent upwards."""
     points, faces = _sphere(subdivisions)
-    towards = np.arccos(np.clip(points @ (LIMBS / np.linalg.norm(LIMBS, axis=1)[:, None]).T, -1, 1))
-    points = points * (1 + np.exp(-((towards / 0.45) ** 2)) @ LENGTHS)[:, None]
+    toward = np.arccos(np.clip(points @ (LIMBS / np.linalg.norm(LIMBS, axis=1)[:, None]).T, -1, 1))
+    points = points * (1 + np.exp(-((toward / 0.45) ** 2)) @ LENGTHS)[:, None]
     return bent(points, bend), faces
 
 

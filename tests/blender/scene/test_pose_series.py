@@ -1,4 +1,4 @@
-"""Poses at frames and in shape keys; the scene is as before afterwards."""
+"""Poses at frames and in shape keys; the scene is as before afterward."""
 
 import bpy
 import numpy as np

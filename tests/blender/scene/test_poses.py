@@ -18,7 +18,7 @@ from builders import (
 from wks_segment.blender.cli.creature import build_creature
 from wks_segment.blender.errors import UserError
 from wks_segment.blender.scene import poses as reader
-from wks_segment.blender.scene.characters import Character
+from wks_segment.blender.scene.characters import Character, polygon_ranges
 
 pytestmark = pytest.mark.usefixtures("scene")
 UP = np.array([0.0, 0.0, 1.0])
@@ -121,7 +121,7 @@ def test_two_objects_are_read_as_one_surface_in_order():
     assert pose.mesh.n_vertices == 8 + len(second.data.vertices)
     assert pose.mesh.faces[:12].max() < 8 <= pose.mesh.faces[12:].min()
     assert np.unique(pose.polygon_of).tolist() == list(range(6 + len(second.data.polygons)))
-    ranges = reader.polygon_ranges(pose.character)
+    ranges = polygon_ranges(pose.character)
     assert [(obj.name, part.start, part.stop) for obj, part in ranges] == [
         ("A", 0, 6),
         ("B", 6, pose.polygon_of[-1] + 1),

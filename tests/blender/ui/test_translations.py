@@ -51,7 +51,7 @@ def test_all_that_is_shown_has_a_german_text(extension):
     known = {(context, text) for context, text in TRANSLATIONS["de_DE"] if context not in (MESSAGE, NAME)}
     needed = {(context, text) for context, text in shown(registration.CLASSES) if text not in BLENDERS}
     assert needed - known == set()
-    assert known - needed == set(), "nothing shows these any more"
+    assert known - needed == set(), "these are no longer shown"
 
 
 def test_texts_are_german_and_without_a_full_stop():

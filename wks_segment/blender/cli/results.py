@@ -55,8 +55,8 @@ def label_and_write(
         settings.keep_notes(PartNotes())
     if options.render:
         with run.report.stage("render"):
-            joined = settings.notes().joined
-            tiles = [Tile(pose, merge_parts(labels[pose.character], joined), pose.name) for pose in poses]
+            merged_into = settings.notes().joined
+            tiles = [Tile(pose, merge_parts(labels[pose.character], merged_into), pose.name) for pose in poses]
             render_poses(tiles, options.render, style=settings.style())
 
 

@@ -15,7 +15,7 @@ from ._base import BaseOperator
 
 
 def _two_segments(context: bpy.types.Context) -> Message | None:
-    """Two segments in the list."""
+    """A message if the list has fewer than two segments."""
     return Message("There is only one segment") if len(context.scene.wks_segment.segments) < 2 else None
 
 
@@ -45,8 +45,8 @@ class WKS_SEGMENT_OT_merge_segments(BaseOperator, bpy.types.Operator):
         if part is None or into == part or into not in [item.number for item in settings.segments]:
             raise UserError("Choose another segment to merge the active one into")
         notes, style = settings.notes(), settings.style()
-        joined = {other: into if old == part else old for other, old in notes.joined.items()}
-        settings.keep_notes(replace(notes, joined=joined | {part: into}))
+        merged_into = {other: into if old == part else old for other, old in notes.joined.items()}
+        settings.keep_notes(replace(notes, joined=merged_into | {part: into}))
         segment_list.rewrite_all(settings)
         segment_list.activate(settings, into)
         _report.tell(

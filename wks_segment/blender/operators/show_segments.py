@@ -24,7 +24,7 @@ class _HidesFaces(BaseOperator):
     needs = (_needs.object_or_edit_mode, _needs.active_segment)
 
     def hidden(self, labels: IntArray, before: BoolArray, settings: bpy.types.PropertyGroup) -> BoolArray:
-        """(p,) whether each face is hidden afterwards, given the part of each and whether it was hidden before."""
+        """(p,) whether each face is hidden afterward, given the part of each and whether it was hidden before."""
         raise NotImplementedError
 
     def run(self, context: bpy.types.Context) -> set[str]:

@@ -11,8 +11,7 @@ from ..outputs.connected_regions import regions_of
 from ..outputs.overrides import by_hand, keep_by_hand
 from ..parts import part_ids
 from ..parts.palette import MAX_COLORS
-from ..scene.characters import group
-from ..scene.poses import polygon_ranges
+from ..scene.characters import group, polygon_ranges
 from ..workflow import segment_list
 from . import _needs, _report
 from ._base import BaseOperator

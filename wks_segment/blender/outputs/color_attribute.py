@@ -29,7 +29,7 @@ class ColorAttribute:
         attribute = mesh.color_attributes.new(free_name(mesh, PART_COLORS), "BYTE_COLOR", "CORNER")
         ledger["colors"] = attribute.name
         colors = np.ones((len(mesh.loops), 4), dtype=np.float32)
-        colors[:, :3] = parts.options.style.colors_of(at_corners(mesh, parts.labels))
+        colors[:, :3] = parts.options.style.colors_of(at_corners(mesh, parts.of_polygons))
         write_attribute(attribute, colors)
         # What is rendered stays the user's, if there was something: only what Solid view shows changes.
         if mesh.color_attributes.render_color_index < 0:

@@ -10,9 +10,8 @@ from scipy.spatial import cKDTree
 
 from ...core.mesh.triangle_mesh import FloatArray, IntArray, components_of_pairs
 from ..scene.attributes import read_floats
-from ..scene.characters import Character
+from ..scene.characters import Character, polygon_ranges
 from ..scene.mesh_arrays import Body
-from ..scene.poses import polygon_ranges
 from ..scene.topology import neighbors
 from .part_attributes import labels_on
 
@@ -51,7 +50,7 @@ def _regions(character: Character, part: int, least_share: float) -> IntArray:
     number[large] = np.arange(len(large))
     regions = number[component]
     if (regions < 0).any():
-        centers = Body.of(character).polygons[polygons]
+        centers = Body.of(character).polygon_centers[polygons]
         nearest = cKDTree(centers[regions >= 0]).query(centers[regions < 0])[1]
         regions[regions < 0] = regions[regions >= 0][nearest]
     result[polygons] = regions
@@ -94,7 +93,7 @@ def _numbered_like(character: Character, regions: IntArray, other: Character, kn
 
 def _places(character: Character, regions: IntArray, count: int) -> FloatArray:
     """(count, 3) center of each region, from 0 to 1 along each axis of the character's bounding box."""
-    centers = Body.of(character).polygons
+    centers = Body.of(character).polygon_centers
     extent = np.ptp(centers, axis=0)
     unit = (centers - centers.min(axis=0)) / np.where(extent > 0, extent, 1)
     return np.array([unit[regions == region].mean(axis=0) for region in range(count)])

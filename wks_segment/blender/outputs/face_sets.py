@@ -30,8 +30,8 @@ class FaceSets:
             mesh.attributes.new(FACE_SET_ATTRIBUTE, "INT", "FACE")
         else:
             ledger.add_attribute("own_face_sets", OWN_FACE_SETS, "INT", "FACE", own)
-        ledger["face_sets"] = [part + FIRST_FACE_SET for part in part_ids.unique_parts(parts.labels)]
-        write_attribute(mesh.attributes[FACE_SET_ATTRIBUTE], parts.labels + FIRST_FACE_SET)
+        ledger["face_sets"] = [part + FIRST_FACE_SET for part in part_ids.unique_parts(parts.of_polygons)]
+        write_attribute(mesh.attributes[FACE_SET_ATTRIBUTE], parts.of_polygons + FIRST_FACE_SET)
 
     def take_back(self, mesh: bpy.types.Mesh, ledger: Ledger) -> None:
         """Give faces that are still in a face set of ours their own back; sets that the artist drew since stay."""

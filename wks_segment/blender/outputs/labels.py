@@ -38,13 +38,13 @@ OUTPUTS: tuple[Output, ...] = (
     ModelLabels(),
 )
 """What is written with labels, in this order."""
-NOTHING_JOINED: Mapping[int, int] = MappingProxyType({})
+NOTHING_MERGED: Mapping[int, int] = MappingProxyType({})
 LASTING_OUTPUTS: tuple[LastingOutput, ...] = (UvMap(), IdMapImage(), ByHand())
 
 
 def write_labels(
     mesh: bpy.types.Mesh, labels: IntArray, options: OutputOptions = DEFAULT_OUTPUTS,
-    joined: Mapping[int, int] = NOTHING_JOINED, weights: Mapping[int, FloatArray] | None = None,
+    merged_into: Mapping[int, int] = NOTHING_MERGED, weights: Mapping[int, FloatArray] | None = None,
 ) -> IntArray:  # fmt: skip
     """Write the parts of polygons to a mesh with a person's changes, in place of what was written before.
 
@@ -54,8 +54,8 @@ def write_labels(
     ----------
     labels : (p,) int array
         Part of each polygon as the model gives it. Faces that have a part by hand keep that.
-    joined
-        The part that a part is merged into.
+    merged_into
+        For a part that the user merged, the part it is merged into.
     weights
         (n,) weights of the model's parts, for soft vertex groups; they follow the changes. Without them the groups are
         hard, if the options ask for groups.
@@ -66,7 +66,7 @@ def write_labels(
         The parts as they were written.
     """
     given = by_hand(mesh)
-    final = merge_parts(np.where(given < 0, labels, given), joined)
+    final = merge_parts(np.where(given < 0, labels, given), merged_into)
     if weights is not None:
         weights = move_weights(mesh, weights, labels, final)
     elif options.vertex_groups != "none":
@@ -83,7 +83,7 @@ def write_labels(
     return final
 
 
-def rewrite_labels(mesh: bpy.types.Mesh, style: Style, joined: Mapping[int, int]) -> None:
+def rewrite_labels(mesh: bpy.types.Mesh, style: Style, merged_into: Mapping[int, int]) -> None:
     """Write the labels of a mesh again, with all outputs that it has, after a person's changes."""
     labels, before = model_labels(mesh), labels_on(mesh)
     if labels is None or before is None:
@@ -107,7 +107,7 @@ def rewrite_labels(mesh: bpy.types.Mesh, style: Style, joined: Mapping[int, int]
         style=style,
     )
     with materials_kept(mesh):
-        write_labels(mesh, labels, options, joined, weights)
+        write_labels(mesh, labels, options, merged_into, weights)
 
 
 def clear_labels(mesh: bpy.types.Mesh) -> bool:

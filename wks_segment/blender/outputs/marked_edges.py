@@ -9,8 +9,7 @@ import numpy as np
 
 from ...core.mesh.triangle_mesh import IntArray
 from ..scene.attributes import read_bools
-from ..scene.characters import Character
-from ..scene.poses import polygon_ranges
+from ..scene.characters import Character, polygon_ranges
 from ..scene.topology import neighbors_at_edges, welded_edges
 from .materials import own_material_index
 from .seams import own_seams

@@ -29,7 +29,7 @@ class Materials:
 
     def write(self, mesh: bpy.types.Mesh, parts: PartsOfMesh, ledger: Ledger) -> None:
         """Add the slots and assign them to the polygons, if the options ask for materials."""
-        options, labels = parts.options, parts.labels
+        options, labels = parts.options, parts.of_polygons
         if not options.materials:
             return
         template = bpy.data.materials.get(options.template)

@@ -9,7 +9,7 @@ from ..parts.part_style import PLAIN, Style
 
 @dataclass(frozen=True)
 class OutputOptions:
-    """What the settings ask to be written to meshes; fit for a thread.
+    """What the settings ask to be written to meshes. Contains no Blender data, so that threads may use it.
 
     Attributes
     ----------
@@ -18,7 +18,7 @@ class OutputOptions:
     template : str
         Name of the material that the materials of parts are copies of; empty for plain ones.
     vertex_groups : "none", "hard" or "soft"
-        Hard groups are made of the labels; soft ones need weights, and are hard without.
+        Hard groups are made of the labels; soft ones need weights, and fall back to hard if there are none.
     style : Style
         Names and colors of parts.
     """

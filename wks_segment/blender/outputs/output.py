@@ -19,10 +19,10 @@ class PartsOfMesh:
 
     Attributes
     ----------
-    labels : (p,) int array
-        Part of each polygon, with what a person changed.
-    model_labels : (p,) int array
-        The same as the model gives it.
+    of_polygons : (p,) int array
+        Part of each polygon, with the user's changes.
+    by_model : (p,) int array
+        Part of each polygon as the model gives it.
     weights : dict, optional
         (n,) weights of the vertices in each part, for vertex groups; none are written if not given.
     active_group : str, optional
@@ -30,8 +30,8 @@ class PartsOfMesh:
     options : OutputOptions
     """
 
-    labels: IntArray
-    model_labels: IntArray
+    of_polygons: IntArray
+    by_model: IntArray
     weights: Mapping[int, FloatArray] | None
     active_group: str | None
     options: OutputOptions

@@ -28,8 +28,8 @@ class ModelLabels:
 
     def write(self, mesh: bpy.types.Mesh, parts: PartsOfMesh, ledger: Ledger) -> None:
         """Keep the model's labels, if they differ from those that were written."""
-        if not np.array_equal(parts.labels, parts.model_labels):
-            ledger.add_attribute("model_labels", MODEL_LABELS, "INT", "FACE", parts.model_labels)
+        if not np.array_equal(parts.of_polygons, parts.by_model):
+            ledger.add_attribute("model_labels", MODEL_LABELS, "INT", "FACE", parts.by_model)
 
     def take_back(self, mesh: bpy.types.Mesh, ledger: Ledger) -> None:
         """Remove the attribute."""
@@ -71,9 +71,9 @@ def model_labels(mesh: bpy.types.Mesh) -> IntArray | None:
     return labels_on(mesh) if kept is None else kept
 
 
-def merge_parts(labels: IntArray, joined: Mapping[int, int]) -> IntArray:
+def merge_parts(labels: IntArray, merged_into: Mapping[int, int]) -> IntArray:
     """(p,) parts, where each part that is merged into another is replaced by that one."""
-    replacement = np.arange(max(labels.max(initial=-1), *joined, -1) + 1)
-    for part, other in joined.items():
+    replacement = np.arange(max(labels.max(initial=-1), *merged_into, -1) + 1)
+    for part, other in merged_into.items():
         replacement[part] = other
     return np.asarray(replacement[labels])

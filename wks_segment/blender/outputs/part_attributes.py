@@ -20,8 +20,8 @@ class PartAttributes:
 
     def write(self, mesh: bpy.types.Mesh, parts: PartsOfMesh, ledger: Ledger) -> None:
         """Add both attributes."""
-        ledger.add_attribute("faces", FACE_ATTRIBUTE, "INT", "FACE", parts.labels)
-        ledger.add_attribute("vertices", VERTEX_ATTRIBUTE, "INT", "POINT", _labels_of_vertices(mesh, parts.labels))
+        ledger.add_attribute("faces", FACE_ATTRIBUTE, "INT", "FACE", parts.of_polygons)
+        ledger.add_attribute("vertices", VERTEX_ATTRIBUTE, "INT", "POINT", _labels_of_vertices(mesh, parts.of_polygons))
 
     def take_back(self, mesh: bpy.types.Mesh, ledger: Ledger) -> None:
         """Remove both attributes."""

@@ -24,7 +24,7 @@ class Seams:
         if not parts.options.seams:
             return
         own = read_bools(mesh.edges, "use_seam")
-        ours = border_edges(mesh, parts.labels) & ~own
+        ours = border_edges(mesh, parts.of_polygons) & ~own
         ledger["had_seams"] = _seam_attribute(mesh) is not None
         ledger.add_attribute("seams", OUR_SEAMS, "BOOLEAN", "EDGE", ours)
         write_bools(mesh.edges, "use_seam", own | ours)

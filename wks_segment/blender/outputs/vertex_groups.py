@@ -24,7 +24,7 @@ class VertexGroups:
         """Add a group for each part whose (n,) weights are not all 0, if there are weights.
 
         Vertices are in a group only where their weight is above 0. The group that was active before the groups of
-        earlier labels were taken back is active afterwards, if there is one of its name.
+        earlier labels were taken back is active afterward, if there is one of its name.
         """
         if parts.weights is None:
             return

@@ -72,7 +72,7 @@ def weights_of_parts(weights: FloatArray, labels: IntArray, body: Body) -> dict[
     result: dict[int, FloatArray] = {}
     for segment in np.flatnonzero(weights.any(axis=0)).tolist():
         in_segment = np.flatnonzero(part_ids.segments_of(labels) == segment)
-        nearest, parts = _nearest_part(labels[in_segment], body.polygons[in_segment], body.vertices, segment)
+        nearest, parts = _nearest_part(labels[in_segment], body.polygon_centers[in_segment], body.vertices, segment)
         result |= {part: np.where(nearest == part, weights[:, segment], 0.0) for part in parts}
     return result
 
@@ -108,7 +108,7 @@ def own_vertices(pose: Pose, values: FloatArray, body: Body) -> tuple[FloatArray
     if seen.all():
         return own, seen
     # 1 where a polygon has a corner at a vertex.
-    around = csr_matrix((np.ones(len(body.corners[0])), body.corners), shape=(n_vertices, len(body.polygons)))
+    around = csr_matrix((np.ones(len(body.corners[0])), body.corners), shape=(n_vertices, len(body.polygon_centers)))
     of_polygon = indicator(pose.polygon_of, around.shape[1])
     # Polygons without area count as well, but hardly.
     areas = pose.mesh.face_areas / pose.mesh.area + np.finfo(float).eps

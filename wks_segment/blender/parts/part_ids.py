@@ -27,6 +27,7 @@ SIDE_SUFFIXES = ("", ".L", ".R")
 
 def from_segments(segments: IntArray, sides: IntArray) -> IntArray:
     """(p,) part of each polygon, given its segment (−1 for none) and its side (1 left, −1 right, 0 neither)."""
+    # The core has 1, −1 and 0 for left, right and neither; the numbers of parts have 1, 2 and 0: −1 % 3 is 2.
     return np.where(segments < 0, segments, segments + SIDE_STEP * (sides % len(SIDE_SUFFIXES)))
 
 
@@ -67,7 +68,7 @@ def without_side(name: str) -> str:
 def siblings_of(part: int) -> list[int]:
     """The parts that share a name except for its suffix: a model's part on the left and the same part on the right.
 
-    A part in the middle and a part that a person made are alone.
+    A part in the middle or made by hand has no sibling: only the part itself is returned.
     """
     segment, side = part % SIDE_STEP, part // SIDE_STEP
     return [part] if side == 0 or segment >= FIRST_MADE else [segment + SIDE_STEP, segment + 2 * SIDE_STEP]

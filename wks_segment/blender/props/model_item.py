@@ -17,8 +17,8 @@ def _renamed(row: Any, context: bpy.types.Context) -> None:
 class WKSModelItem(bpy.types.PropertyGroup):
     """A learned model of this scene.
 
-    The text of the model in use is kept in the settings, where labels, names and colors are read and written; its row
-    holds none.
+    The text of the model in use is kept in the settings, where its names and colors are read and written; its row holds
+    none.
     """
 
     name: StringProperty(name="Name", description="Name of the model, unique in the list", update=_renamed)

@@ -60,7 +60,7 @@ LABEL_SETTINGS: dict[str, dict[str, Any]] = {
         "default": 0.5, "min": 0.0, "max": 20.0, "precision": 1, "subtype": "PERCENTAGE",
     },
 }  # fmt: skip
-"""Settings that labels follow at once; operators that label show them, too, in Adjust Last Operation."""
+"""Settings that labels follow and that operators show as well, in Adjust Last Operation."""
 MODEL_PARAMETERS = (
     "n_segments", "n_eigenpairs", "n_energies", "covariance_type", "scaling", "random_state", "pieces",
     "laplacian", "smoothness", "preset",

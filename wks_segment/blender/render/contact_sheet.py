@@ -59,10 +59,10 @@ def render_poses(tiles: Sequence[Tile], path: Path, columns: int = TILES_IN_ROW,
     """
     columns = min(columns, len(tiles))
     rows = ceil(len(tiles) / columns)
-    towards = VIEW_DIRECTION.normalized()
-    right = Vector((0, 0, 1)).cross(towards).normalized()
-    up = towards.cross(right)
-    axes = np.array([right, up, towards])
+    toward = VIEW_DIRECTION.normalized()
+    right = Vector((0, 0, 1)).cross(toward).normalized()
+    up = toward.cross(right)
+    axes = np.array([right, up, toward])
     placed = [tile.pose.mesh.vertices @ axes.T for tile in tiles]
     tile_size = TILE_SCALE * max(float(np.ptp(points[:, :2], axis=0).max()) for points in placed)
     with picture_scene() as scene:
@@ -93,7 +93,7 @@ def picture_scene() -> Iterator[bpy.types.Scene]:
 
 
 def _add_pose(scene: bpy.types.Scene, points: FloatArray, tile: Tile, style: Style) -> None:
-    """Add the triangles of a pose, with points in camera axes: x to the right, y up, z towards the camera."""
+    """Add the triangles of a pose, with points in camera axes: x to the right, y up, z toward the camera."""
     mesh = bpy.data.meshes.new("pose")
     mesh.from_pydata(points.tolist(), [], tile.pose.mesh.faces.tolist())
     mesh.shade_smooth()

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import bpy
+import numpy as np
 
 from ...core.message import Message
 from ..errors import UserError
@@ -26,7 +27,7 @@ class Member:
     mesh_uid: int
 
     def resolve(self) -> bpy.types.Object | None:
-        """The object, also if it was renamed; None if it was deleted or has no mesh any more."""
+        """The object, also if it was renamed; None if it was deleted or no longer has a mesh."""
         obj = bpy.data.objects.get(self.name)
         if obj is None or obj.session_uid != self.uid:
             obj = next((other for other in bpy.data.objects if other.session_uid == self.uid), None)
@@ -68,7 +69,7 @@ class Character:
         objects = {member.name: member.resolve() for member in self.members}
         missing = [name for name, obj in objects.items() if obj is None]
         if missing:
-            raise UserError("{names} does not exist any more", names=quoted(missing))
+            raise UserError("{names} no longer exists", names=quoted(missing))
         return tuple(objects.values())
 
     @property
@@ -96,6 +97,22 @@ class Character:
         for obj in self.objects:
             blocks |= dict.fromkeys(b for b in (armature_of(obj), obj, obj.data.shape_keys) if b is not None)
         return list(blocks)
+
+
+def polygon_ranges(character: Character) -> list[tuple[bpy.types.Object, slice]]:
+    """Each object of a character, and the range of its polygons in the character's numbering."""
+    return _ranges(character, "polygons")
+
+
+def vertex_ranges(character: Character) -> list[tuple[bpy.types.Object, slice]]:
+    """Each object of a character, and the range of its vertices in the character's numbering."""
+    return _ranges(character, "vertices")
+
+
+def _ranges(character: Character, of: str) -> list[tuple[bpy.types.Object, slice]]:
+    ends = np.cumsum([len(getattr(obj.data, of)) for obj in character.objects]).tolist()
+    starts = [0, *ends[:-1]]
+    return [(obj, slice(a, b)) for obj, a, b in zip(character.objects, starts, ends, strict=True)]
 
 
 def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:

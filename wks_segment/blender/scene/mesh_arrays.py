@@ -9,8 +9,7 @@ import numpy as np
 
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from .attributes import Elements, read_floats
-from .characters import Character
-from .poses import polygon_ranges, vertex_ranges
+from .characters import Character, polygon_ranges, vertex_ranges
 from .topology import corners_of
 
 
@@ -22,8 +21,8 @@ class Body:
     ----------
     vertices : (n, 3) array
         Positions in world space.
-    polygons : (p, 3) array
-        Centers in world space.
+    polygon_centers : (p, 3) array
+        In world space.
     corners : tuple of two (c,) int arrays
         Vertex and polygon of each corner.
     marked : (q, 2) int array or None
@@ -31,7 +30,7 @@ class Body:
     """
 
     vertices: FloatArray
-    polygons: FloatArray
+    polygon_centers: FloatArray
     corners: tuple[IntArray, IntArray]
     marked: IntArray | None = None
 
@@ -39,17 +38,17 @@ class Body:
     def of(cls, character: Character, marked: IntArray | None = None) -> Body:
         """Read a character as it is now."""
         vertices: list[FloatArray] = []
-        polygons: list[FloatArray] = []
+        centers: list[FloatArray] = []
         corners: list[tuple[IntArray, IntArray]] = []
         for (obj, vertex_range), (_, polygon_range) in zip(
             vertex_ranges(character), polygon_ranges(character), strict=True
         ):
             vertices.append(_in_world(obj, obj.data.vertices, "co"))
-            polygons.append(_in_world(obj, obj.data.polygons, "center"))
+            centers.append(_in_world(obj, obj.data.polygons, "center"))
             vertex, polygon = corners_of(obj.data)
             corners.append((vertex + vertex_range.start, polygon + polygon_range.start))
         vertex_of_corner, polygon_of_corner = (np.concatenate(arrays) for arrays in zip(*corners, strict=True))
-        return cls(np.concatenate(vertices), np.concatenate(polygons), (vertex_of_corner, polygon_of_corner), marked)
+        return cls(np.concatenate(vertices), np.concatenate(centers), (vertex_of_corner, polygon_of_corner), marked)
 
 
 def _in_world(obj: bpy.types.Object, elements: Elements, prop: str) -> FloatArray:

@@ -21,7 +21,7 @@ BONE = re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]')
 def read_actions(context: bpy.types.Context, character: Character, count: int) -> list[Pose]:
     """A character in at most `count` poses of its library, evenly chosen; each pose starts from the rest position.
 
-    A pose asset is one pose; of another action, the pose at the middle frame is read. Afterwards the armature has its
+    A pose asset is one pose; of another action, the pose at the middle frame is read. Afterward the armature has its
     pose from before.
 
     Raises

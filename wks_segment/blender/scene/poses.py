@@ -14,7 +14,7 @@ from ...core.mesh.triangle_mesh import FloatArray, IntArray, repeats_a_vertex
 from ...core.message import Message, message_of
 from ..errors import UserError
 from .attributes import new_attribute, read_floats, read_ints
-from .characters import Character, armature_of, quoted
+from .characters import Character, armature_of, polygon_ranges, quoted, vertex_ranges
 
 ORIGIN = ".wks_segment_origin"
 """Temporary face attribute with the number of each face: modifiers copy it to the faces that they make of a face."""
@@ -104,22 +104,6 @@ class Pose:
         return np.array_equal(ours, theirs)
 
 
-def polygon_ranges(character: Character) -> list[tuple[bpy.types.Object, slice]]:
-    """Each object of a character, and the range of its polygons in the character's numbering."""
-    return _ranges(character, "polygons")
-
-
-def vertex_ranges(character: Character) -> list[tuple[bpy.types.Object, slice]]:
-    """Each object of a character, and the range of its vertices in the character's numbering."""
-    return _ranges(character, "vertices")
-
-
-def _ranges(character: Character, of: str) -> list[tuple[bpy.types.Object, slice]]:
-    ends = np.cumsum([len(getattr(obj.data, of)) for obj in character.objects]).tolist()
-    starts = [0, *ends[:-1]]
-    return [(obj, slice(a, b)) for obj, a, b in zip(character.objects, starts, ends, strict=True)]
-
-
 def read_objects(context: bpy.types.Context, characters: Sequence[Character]) -> list[Pose]:
     """One pose of each character, as it is now."""
     return in_one_cut(
@@ -130,7 +114,7 @@ def read_objects(context: bpy.types.Context, characters: Sequence[Character]) ->
 def read_frames(
     context: bpy.types.Context, character: Character, frames: Sequence[int], names: Sequence[str] | None = None
 ) -> list[Pose]:
-    """A character at frames of its animation, with these names; the scene is at its own frame again afterwards."""
+    """A character at frames of its animation, with these names; the scene is at its own frame again afterward."""
     scene = context.scene
     before, subframe = scene.frame_current, scene.frame_subframe
     try:
@@ -290,7 +274,7 @@ def _named(character: Character, name: str) -> Message:
 def _axes(character: Character, depsgraph: bpy.types.Depsgraph) -> FloatArray:
     """(3, 3) the axes of the character's armature, or of its largest object, as columns.
 
-    Those by which bones and vertices are named .L and .R, whichever way the character stands in the scene.
+    The names .L and .R refer to these axes, however the character is turned.
     """
     armatures = [armature for armature in map(armature_of, character.objects) if armature is not None]
     body = armatures[0] if armatures else max(character.objects, key=lambda obj: len(obj.data.polygons))

@@ -85,7 +85,7 @@ class ViewportPreview:
         _redraw(context)
 
     def hide(self) -> None:
-        """Show nothing any more."""
+        """Stop showing labels."""
         if self._handle is None:
             return
         bpy.types.SpaceView3D.draw_handler_remove(self._handle, "WINDOW")

@@ -186,7 +186,7 @@ class JobHolder:
         self._timer = context.window_manager.event_timer_add(TIMER_INTERVAL, window=context.window)
 
     def release(self, message: str = "") -> None:
-        """Hold no job any more; one that still runs is asked to end. The panel shows the message until the next job."""
+        """Release the job; one that still runs is asked to end. The panel shows the message until the next job."""
         self.message = message
         if self.job is not None:
             self.job.end()

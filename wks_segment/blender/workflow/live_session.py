@@ -19,7 +19,7 @@ from ..errors import ChangedError, UserError
 from ..outputs.overrides import merge_parts
 from ..parts.part_style import Style
 from ..props.preferences import preference
-from ..props.settings import WKSSegmentSettings
+from ..props.settings import LABEL_SETTINGS, WKSSegmentSettings
 from ..scene.characters import Character
 from .background_job import job_holder, redraw_sidebars
 from .segmentation_job import SegmentationJob
@@ -29,7 +29,7 @@ SESSION = "wks_segment_session"
 QUIET_SECONDS = 0.1
 """Seconds without a change of settings before labels follow. With less they would follow while a slider is dragged;
 with more the user would notice the wait."""
-FOLLOWED_SETTINGS = ("n_segments", "auto_segments", "sides", "smoothness", "min_share", "snap_to")
+FOLLOWED_SETTINGS = (*LABEL_SETTINGS, "snap_to")
 """Settings that labels follow."""
 NOTHING_TO_UPDATE = "Nothing was learned or applied since this file was opened, or it was undone"
 MAX_KEPT_BYTES = 1_000_000_000
@@ -44,7 +44,7 @@ class Preview(Protocol):
         """Show labels; UserError if a character cannot be read."""
 
     def hide(self) -> None:
-        """Show nothing any more."""
+        """Stop showing labels."""
 
 
 class Session:
@@ -63,7 +63,7 @@ class Session:
         self._cache = MemoryCache()
         self.job: SegmentationJob | None = None
         self.message = ""
-        """Why labels do not follow any more, for the panel."""
+        """Why labels no longer follow, for the panel."""
         self.proposed: tuple[str, SegmentationJob] | None = None
         """The shown but unwritten job with the state of its settings, until it is accepted or discarded."""
         self.preview = preview
@@ -120,7 +120,7 @@ class Session:
         return bool(self.seconds > preference(bpy.context, "live_seconds"))
 
     def schedule(self, scene: bpy.types.Scene) -> None:
-        """Let labels follow as soon as the settings do not change any more, if the user wants that."""
+        """Let labels follow as soon as the settings no longer change, if the user wants that."""
         if not (scene.wks_segment.live and self.holds(scene)) or self.is_slow:
             return
         self._due = time.monotonic() + QUIET_SECONDS
@@ -233,7 +233,7 @@ class Session:
         except ChangedError as error:
             self.drop()
             raise UserError(
-                "Segments are not updated any more, learn or apply again: {reason}", reason=message_of(error)
+                "Segments are no longer updated, learn or apply again: {reason}", reason=message_of(error)
             ) from error
 
     def _state(self, scene: bpy.types.Scene) -> str:

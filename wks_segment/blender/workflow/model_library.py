@@ -1,6 +1,6 @@
 """The models of a scene: the one in use, the others of the list, and those of the model folder.
 
-The model in use is stored in the settings themselves (`model`, `model_summary`, `part_notes`), where labels, names and
+The model in use is stored in the settings themselves (`model`, `model_summary`, `part_notes`), where its names and
 colors are read and written. The row of any other model stores the same until it is used. The active row is the model
 in use.
 """

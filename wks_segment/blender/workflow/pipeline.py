@@ -1,7 +1,7 @@
 """The steps that the operators and the command line share: describe, learn, label, soften, write.
 
-All but `write` work on arrays without Blender, so that a thread can run them; `LabelRequest` is what they need of the
-settings and the scene.
+`describe`, `learn`, `label` and `soften` need no Blender, so that a thread can run them; `LabelRequest.of` reads what
+they need, `write_outputs` writes.
 """
 
 from __future__ import annotations
@@ -35,16 +35,15 @@ from ..outputs.options import OutputOptions
 from ..outputs.vertex_weights import soft_weights, weights_of_parts
 from ..parts import part_ids
 from ..props.settings import WKSSegmentSettings
-from ..scene import poses as reader
-from ..scene.characters import Character
+from ..scene.characters import Character, polygon_ranges, vertex_ranges
 from ..scene.mesh_arrays import Body
 from ..scene.poses import Pose
 from . import model_library, segment_list
 from .report import Report
 
 SEGMENT_SHARE = 0.6
-"""Share of segments in the progress of labels with sides; the rest tells left from right. A wrong share only makes the
-progress bar uneven."""
+"""Share of the labeling progress that is spent on segments; the rest tells left from right. A wrong share only makes
+the progress bar uneven."""
 
 
 @dataclass(frozen=True)
@@ -195,7 +194,7 @@ def _connections(model: PoseSegmentation, poses: Sequence[Pose], progress: Progr
         if original < i:
             connections.append(connections[original])
             continue
-        progress(0.0, Message('Seams of "{pose}"', pose=pose.name))
+        progress(0.0, Message('Connecting "{pose}"', pose=pose.name))
         same_mesh = [other.mesh for other in poses if pose.is_mesh_of(other)]
         try:
             connections.append(connect(*same_mesh, rest=pose.rest, pieces=model.pieces))
@@ -257,7 +256,7 @@ class MeshViews:
         return self.poses[0].character.name
 
     @property
-    def polygons(self) -> list[IntArray]:
+    def polygon_of_triangles(self) -> list[IntArray]:
         """For each pose, the polygon of each triangle."""
         return [pose.polygon_of for pose in self.poses]
 
@@ -269,14 +268,16 @@ def _parts_of(model: PoseSegmentation, views: MeshViews, request: LabelRequest, 
     stage = Message('Labels of "{character}"', character=views.name)
     parts = model.segment_polygons(
         views.described,
-        views.polygons,
+        views.polygon_of_triangles,
         min_share,
         progress.part(0.0, SEGMENT_SHARE if two_sides else 1.0, stage),
         marked=views.body.marked,
     )
     if two_sides:
         stage = Message('Left and right of "{character}"', character=views.name)
-        sides = model.polygon_sides(views.described, views.polygons, parts, progress.part(SEGMENT_SHARE, 1.0, stage))
+        sides = model.polygon_sides(
+            views.described, views.polygon_of_triangles, parts, progress.part(SEGMENT_SHARE, 1.0, stage)
+        )
         parts = part_ids.from_segments(parts, sides)
     return filled(parts, views.body)
 
@@ -328,7 +329,7 @@ def write_outputs(
     options = replace(request.outputs, style=style)
     with report.stage("write"):
         for character, parts in labels.items():
-            ranges = zip(reader.polygon_ranges(character), reader.vertex_ranges(character), strict=True)
+            ranges = zip(polygon_ranges(character), vertex_ranges(character), strict=True)
             for (obj, polygons), (_, vertices) in ranges:
                 if polygons.stop == polygons.start:
                     continue
@@ -347,7 +348,7 @@ def stored_model(settings: WKSSegmentSettings) -> PoseSegmentation:
 
 def filled(labels: IntArray, body: Body) -> IntArray:
     """(p,) labels of all polygons of a body: one without a label, masked out for example, takes the nearest one's."""
-    places = body.polygons
+    places = body.polygon_centers
     labels = np.concatenate([labels, np.full(len(places) - len(labels), -1)])
     missing = labels < 0
     if missing.any():

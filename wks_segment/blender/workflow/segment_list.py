@@ -22,8 +22,7 @@ from ..parts import part_ids
 from ..parts.palette import most_different
 from ..props.settings import WKSSegmentSettings
 from ..scene.attributes import read_bools, read_floats
-from ..scene.characters import Character, mesh_objects, with_rigged
-from ..scene.poses import polygon_ranges
+from ..scene.characters import Character, mesh_objects, polygon_ranges, with_rigged
 
 SUCCESSOR_OVERLAP = 0.5
 """Common area of an old and a new part, as a share of what they cover together, above which the new part is the old
