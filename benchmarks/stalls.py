@@ -79,7 +79,7 @@ def run() -> dict[str, Any]:
 def watched(job: SegmentationJob) -> tuple[list[dict[str, Any]], BackgroundJob]:
     """The longest delays of this thread while a job runs, and the job."""
     gaps: list[dict[str, Any]] = []
-    running = BackgroundJob("Learn and Segment", job.compute, job.guard.glance)
+    running = BackgroundJob("Learn and Segment", job.compute, job.guard.check_quickly)
     last, over = time.perf_counter(), False
     ticks: list[tuple[float, str, float]] = []
     while not over:

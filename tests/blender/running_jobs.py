@@ -46,5 +46,5 @@ def finish_job(ran):
 def run(operator, **properties):
     """Run the job of an operator to its end; return the operator and its result."""
     ran = CallableOperator(operator, **properties)
-    ran.begin(bpy.context)
+    ran.start_thread(bpy.context)
     return ran, finish_job(ran)

@@ -48,7 +48,7 @@ def hold_at(monkeypatch):
 
         monkeypatch.setattr(BackgroundJob, "_report", progress)
         ran = CallableOperator(operator, **properties)
-        ran.begin(bpy.context)
+        ran.start_thread(bpy.context)
         assert reached.wait(TIMEOUT)
         assert ran.step(bpy.context) == RUNNING
         return ran, go_on_event.set

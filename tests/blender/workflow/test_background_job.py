@@ -21,7 +21,7 @@ from wks_segment.core import MemoryCache
 from wks_segment.core.progress import Progress
 
 pytestmark = pytest.mark.usefixtures("scene")
-STAGES = ["Starting", "Seams", "Signature", "Learning", "Labels", "Left and right", "Weights"]
+STAGES = ["Starting", "Connecting", "Signature", "Learning", "Labels", "Left and right", "Weights"]
 
 
 @pytest.mark.usefixtures("learns_anew")
@@ -77,7 +77,7 @@ def test_job_computes_without_its_file(poses):
 
 
 def test_job_uses_settings_from_its_start(poses, settings, hold_at):
-    ran, go_on = hold_at("Seams")
+    ran, go_on = hold_at("Connecting")
     settings.write_colors = settings.write_materials = False
     settings.vertex_groups, settings.n_segments = "none", 2
     go_on()
@@ -111,10 +111,10 @@ def test_writing_waits_for_object_mode(poses, hold_at):
     select(other)
     bpy.ops.object.mode_set(mode="EDIT")
     go_on()
-    ran.job.wait(TIMEOUT)
+    ran.thread_job.wait(TIMEOUT)
     for _ in range(3):
         assert ran.step(bpy.context) == RUNNING
-    assert ran.job.stage == "Done, to be written in Object Mode"
+    assert ran.thread_job.stage == "Done, to be written in Object Mode"
     assert "wks_segment" not in poses[0].data.attributes
     bpy.ops.object.mode_set(mode="OBJECT")
     assert finish_job(ran) == {"FINISHED"}
@@ -128,7 +128,7 @@ def test_escape_cancels_at_every_stage(poses, hold_at, stage):
     ran, go_on = hold_at(stage)
     assert ran.modal(bpy.context, SimpleNamespace(type="MOUSEMOVE", value="NOTHING")) == RUNNING
     assert ran.modal(bpy.context, SimpleNamespace(type="ESC", value="PRESS")) == {"RUNNING_MODAL"}
-    assert main_panel.job_texts(ran.job) == ("Canceling", "")
+    assert main_panel.job_texts(ran.thread_job) == ("Canceling", "")
     go_on()
     assert finish_job(ran) == {"CANCELLED"}
     assert ran.reported == [("WARNING", "Learn and Segment was canceled, nothing is written")]
@@ -161,7 +161,7 @@ def test_second_job_is_refused(poses, hold_at):
         with pytest.raises(RuntimeError, match=JOB_RUNNING):
             operator()
     with pytest.raises(UserError, match=JOB_RUNNING):
-        CallableOperator(LEARN).begin(bpy.context)
+        CallableOperator(LEARN).start_thread(bpy.context)
     go_on()
     assert finish_job(ran) == {"FINISHED"}
     assert OPS.learn.poll()
@@ -265,8 +265,8 @@ def test_closed_window_ends_the_job(poses, hold_at):
     assert job_holder(bpy.context).job is None
     assert "its window was closed" in job_holder(bpy.context).message
     go_on()
-    ran.job.wait(TIMEOUT)
-    assert not ran.job.succeeded
+    ran.thread_job.wait(TIMEOUT)
+    assert not ran.thread_job.succeeded
     assert not changes(before, scene_snapshot())
     assert OPS.learn() == {"FINISHED"}
 
@@ -280,9 +280,9 @@ def test_disabled_extension_ends_the_job(poses, hold_at, extension, monkeypatch)
     try:
         assert not changes(meshes, {pose.name: snapshot(pose.data) for pose in poses})
         go_on()
-        ran.job.wait(TIMEOUT)
+        ran.thread_job.wait(TIMEOUT)
         with pytest.raises(UserError, match="the extension was disabled"):
-            ran.job.result()
+            ran.thread_job.result()
         for handlers in (bpy.app.handlers.load_pre, bpy.app.handlers.undo_pre, bpy.app.handlers.redo_pre):
             assert not [function for function in handlers if "wks_segment" in function.__module__]
     finally:
@@ -331,7 +331,7 @@ def test_error_in_the_thread_is_reported(settings):
 def test_unexpected_error_is_raised(poses, monkeypatch):
     monkeypatch.setattr(SegmentationJob, "compute", lambda self, progress: 1 / 0)
     ran = CallableOperator(LEARN)
-    ran.begin(bpy.context)
+    ran.start_thread(bpy.context)
     with pytest.raises(ZeroDivisionError):
         finish_job(ran)
     assert job_holder(bpy.context).job is None

@@ -65,7 +65,7 @@ def test_button_runs_at_once_without_a_window(poses):
 def test_large_job_runs_after_the_question(poses, settings, window):
     settings.limit_memory = 1e-6
     with pytest.raises(TooLargeError):
-        CallableOperator(LEARN).begin(window)
+        CallableOperator(LEARN).start_thread(window)
     ran = CallableOperator(LEARN)
     assert ran.invoke(window, "event") == {"RUNNING_MODAL"}
     assert job_holder(bpy.context).job is None

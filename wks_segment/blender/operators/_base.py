@@ -15,7 +15,7 @@ from ...core.message import Message, message_of
 from ...core.progress import Progress
 from ..errors import ChangedError, EndedError, TooLargeError, UserError
 from ..props.settings import LABEL_SETTINGS, WKSSegmentSettings
-from ..scene.change_guard import Watch
+from ..scene.change_guard import ChangeGuard
 from ..scene.poses import Pose
 from ..ui.messages import in_panel
 from ..workflow import pipeline
@@ -51,13 +51,13 @@ class BaseOperator:
         try:
             return self.run(context)
         except UserError as error:
-            return self.refused(error)
+            return self.refuse(error)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         """Do what the operator is for; may raise UserError."""
         raise NotImplementedError
 
-    def refused(self, error: Exception) -> set[str]:
+    def refuse(self, error: Exception) -> set[str]:
         """Report an error, and cancel."""
         _report.tell(self, {"ERROR"}, message_of(error))
         return {"CANCELLED"}
@@ -67,7 +67,7 @@ class ComputedJob(Protocol):
     """What an operator computes in a thread, between reading from Blender and writing to it."""
 
     poses: list[Pose]
-    guard: Watch
+    guard: ChangeGuard
 
     @property
     def model(self) -> PoseSegmentation:
@@ -86,8 +86,10 @@ class JobOperator(BaseOperator, Generic[J]):
     confirmed: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
 
     bl_label: str
-    job: BackgroundJob
-    computed: J
+    job: J
+    """What is read, computed and written."""
+    thread_job: BackgroundJob
+    """The thread that computes it."""
     asked = False
     """Whether the next call of `execute` is the answer to the question about a large job."""
 
@@ -95,14 +97,14 @@ class JobOperator(BaseOperator, Generic[J]):
         """Read everything that the job needs; UserError if it cannot be used."""
         raise NotImplementedError
 
-    def written(self, context: bpy.types.Context) -> set[str]:
+    def write_result(self, context: bpy.types.Context) -> set[str]:
         """Write the computed result and report it."""
         raise NotImplementedError
 
     def take(self, settings: WKSSegmentSettings) -> None:
         """Hand properties of the operator to the scene's settings."""
 
-    def adjusted(self, context: bpy.types.Context) -> J | None:
+    def adjust_last(self, context: bpy.types.Context) -> J | None:
         """The last job with the adjusted settings, if the operator is called by Adjust Last Operation."""
         return None
 
@@ -112,7 +114,7 @@ class JobOperator(BaseOperator, Generic[J]):
             return self.execute(context)
         self.take(context.scene.wks_segment)
         try:
-            return self.started(context)
+            return self.start(context)
         except TooLargeError as error:
             self.confirmed = self.asked = True
             return context.window_manager.invoke_confirm(
@@ -120,73 +122,73 @@ class JobOperator(BaseOperator, Generic[J]):
                 confirm_text=in_panel("Go On"),
             )  # fmt: skip
         except UserError as error:
-            return self.refused(error)
+            return self.refuse(error)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         """Called by a script, by Adjust Last Operation, or after the question about a large job."""
         self.take(context.scene.wks_segment)
         if self.asked:
             self.asked = False
-            return self.started(context)
-        self.computed = self.adjusted(context) or self.checked(context)
+            return self.start(context)
+        self.job = self.adjust_last(context) or self.read_and_check(context)
         with _report.cursor_progress(context) as progress:
-            self.computed.compute(progress)
-        return self.written(context)
+            self.job.compute(progress)
+        return self.write_result(context)
 
-    def started(self, context: bpy.types.Context) -> set[str]:
-        """Read, and start to compute in a thread; UserError if that is not possible."""
-        self.begin(context)
+    def start(self, context: bpy.types.Context) -> set[str]:
+        """Read, start the thread and listen to the window's events; UserError if the job cannot be read."""
+        self.start_thread(context)
         job_holder(context).start_timer(context)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
-    def begin(self, context: bpy.types.Context) -> None:
-        """Read, and start the thread."""
-        self.computed = self.checked(context)
-        self.job = job_holder(context).start(self.bl_label, self.computed.compute, self.computed.guard.glance)
+    def start_thread(self, context: bpy.types.Context) -> None:
+        """Read, and start to compute in a thread."""
+        self.job = self.read_and_check(context)
+        self.thread_job = job_holder(context).start(self.bl_label, self.job.compute, self.job.guard.check_quickly)
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Called for every event in the window; all but ESC and the timer are passed on."""
-        if job_holder(context).job is not self.job:  # an error has ended it, and Blender still calls
+        if job_holder(context).job is not self.thread_job:  # an error has ended it, and Blender still calls
             return {"CANCELLED"}
-        if event.type == "ESC" and event.value == "PRESS" and not self.job.ending:
-            self.job.end()
+        if event.type == "ESC" and event.value == "PRESS" and not self.thread_job.ending:
+            self.thread_job.end()
             return {"RUNNING_MODAL"}
         return self.step(context) if event.type == "TIMER" else {"PASS_THROUGH"}
 
     def step(self, context: bpy.types.Context) -> set[str]:
         """Look after the job, and write the result when it is complete."""
         redraw_sidebars(context)
-        if not self.job.step():
+        if not self.thread_job.step():
             return {"PASS_THROUGH"}
-        if context.mode not in WRITABLE_MODES and self.job.succeeded:
-            self.job.stage = "Done, to be written in Object Mode"
+        if context.mode not in WRITABLE_MODES and self.thread_job.succeeded:
+            self.thread_job.stage = "Done, to be written in Object Mode"
             return {"PASS_THROUGH"}
         message = ""
         try:
-            self.job.result()
-            return self.written(context)
+            self.thread_job.result()
+            return self.write_result(context)
         except (ChangedError, EndedError) as error:
-            self.job.end(message_of(error))
-            message = self.job.end_message
+            self.thread_job.end(message_of(error))
+            message = self.thread_job.end_message
             _report.tell(self, {"WARNING"}, message)
             return {"CANCELLED"}
         except UserError as error:
-            return self.refused(error)
+            return self.refuse(error)
         finally:
             job_holder(context).release(message)
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Called by Blender when the window is closed."""
-        self.job.end(Message("its window was closed"))
-        job_holder(context).release(self.job.end_message)
+        self.thread_job.end(Message("its window was closed"))
+        job_holder(context).release(self.thread_job.end_message)
 
-    def checked(self, context: bpy.types.Context) -> J:
-        """The job as read; TooLargeError if it is above the limits and the user has not agreed."""
-        computed = self.read(context)
+    def read_and_check(self, context: bpy.types.Context) -> J:
+        """Read the job; TooLargeError if it is above the limits and the user has not agreed."""
+        job = self.read(context)
         if not self.confirmed:
-            pipeline.check_limits(computed.model, computed.poses, context.scene.wks_segment)
-        return computed
+            pipeline.check_limits(job.model, job.poses, context.scene.wks_segment)
+        return job
 
 
 class LabelOperator(JobOperator[SegmentationJob]):
@@ -219,16 +221,16 @@ class LabelOperator(JobOperator[SegmentationJob]):
         """Whether Adjust Last Operation has undone the operator and runs it again with other settings."""
         return bool(self.options.is_repeat)  # type: ignore[attr-defined]  # an operator's own
 
-    def adjusted(self, context: bpy.types.Context) -> SegmentationJob | None:
+    def adjust_last(self, context: bpy.types.Context) -> SegmentationJob | None:
         """The last job with the adjusted settings; None if there is none of this kind."""
         last = session_of(context).job
         if not self.is_adjusted or last is None or last.learns != self.learns:
             return None
         return last.with_settings(context.scene.wks_segment)
 
-    def written(self, context: bpy.types.Context) -> set[str]:
+    def write_result(self, context: bpy.types.Context) -> set[str]:
         """Write the labels and report them."""
-        session_of(context).write(self.computed)
-        if self.computed.request.outputs.colors:
+        session_of(context).write(self.job)
+        if self.job.request.outputs.colors:
             _report.show_colors(context)
-        return _report.finish(self, self.verb, self.computed.report)
+        return _report.finish(self, self.verb, self.job.report)

@@ -18,7 +18,7 @@ from ._base import LabelOperator
 
 
 def _stored_ranking(context: bpy.types.Context) -> Message | None:
-    """A ranking in this scene."""
+    """A message if this scene has no ranking."""
     return None if context.scene.wks_segment.ranking else Message("No ranking yet: use Rank Models")
 
 
@@ -50,17 +50,17 @@ class WKS_SEGMENT_OT_apply_ranked(LabelOperator, bpy.types.Operator):
             model = model_library.from_text(texts[item.name])
         return SegmentationJob.applying(context, session_of(context).cache, model, ranked_objects(context))
 
-    def written(self, context: bpy.types.Context) -> set[str]:
+    def write_result(self, context: bpy.types.Context) -> set[str]:
         """Use the model, write the labels and report them."""
-        self.computed.guard.look()  # before anything is changed
-        settings = self.computed.guard.scene().wks_segment
+        self.job.guard.check_fully()  # before anything is changed
+        settings = self.job.guard.scene().wks_segment
         item = settings.ranking[self.index]
         if not item.path:
             model_library.use(settings, settings.models.find(item.name))
         else:
-            model, file = self.computed.model, Path(item.path).name
+            model, file = self.job.model, Path(item.path).name
             summary = [Message("From {names}", names=file), Message("{count} segments", count=model.n_segments_)]
             model_library.add_model(settings, model, item.name, summary)
             # The model is in the scene now, under a name that may have got a number.
             item.name, item.path = settings.models[settings.used_model].name, ""
-        return super().written(context)
+        return super().write_result(context)

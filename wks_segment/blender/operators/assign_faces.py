@@ -15,7 +15,7 @@ from ._base import BaseOperator
 
 
 def _faces_by_hand(context: bpy.types.Context) -> Message | None:
-    """A face whose segment was assigned by hand."""
+    """A message if no face was assigned to a segment by hand."""
     return None if context.scene.wks_segment.faces_by_hand else Message("No face was assigned by hand")
 
 

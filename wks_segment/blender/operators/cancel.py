@@ -10,7 +10,7 @@ from ._base import BaseOperator
 
 
 def _running_job(context: bpy.types.Context) -> Message | None:
-    """A running job."""
+    """A message if no job is running."""
     return Message("No job is running") if job_holder(context).job is None else None
 
 

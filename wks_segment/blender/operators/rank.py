@@ -13,7 +13,7 @@ from ._base import JobOperator
 
 
 def _any_model(context: bpy.types.Context) -> Message | None:
-    """A model in this scene, or a model folder.
+    """A message if there is neither a model in this scene nor a model folder.
 
     The folder itself is not searched, since this is called whenever the panel is drawn and the folder may be slow.
     """
@@ -35,8 +35,8 @@ class WKS_SEGMENT_OT_rank(JobOperator[RankingJob], bpy.types.Operator):
         """Read the models and the active character."""
         return RankingJob.read(context, session_of(context).cache)
 
-    def written(self, context: bpy.types.Context) -> set[str]:
+    def write_result(self, context: bpy.types.Context) -> set[str]:
         """Show the ranking and report the verdict."""
-        _report.tell(self, {"INFO"}, self.computed.write())
-        _report.tell_warnings(self, self.computed.report.warnings)
+        _report.tell(self, {"INFO"}, self.job.write())
+        _report.tell_warnings(self, self.job.report.warnings)
         return {"FINISHED"}

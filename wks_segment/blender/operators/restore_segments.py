@@ -18,7 +18,7 @@ AS_THE_MODEL = "The segments are as in the model"
 
 
 def _edited_segments(context: bpy.types.Context) -> Message | None:
-    """Segments that the user has merged, split or made."""
+    """A message if the user has not merged, split or made a segment."""
     settings = context.scene.wks_segment
     return None if settings.faces_by_hand or settings.notes().joined else Message(AS_THE_MODEL)
 

@@ -18,7 +18,7 @@ from ._base import BaseOperator
 
 
 def _labeled_active_object(context: bpy.types.Context) -> Message | None:
-    """An active object that has segments."""
+    """A message if the active object has no segments."""
     active = context.active_object
     if active is not None and active.type == "MESH" and labels_on(active.data) is not None:
         return None
@@ -26,7 +26,7 @@ def _labeled_active_object(context: bpy.types.Context) -> Message | None:
 
 
 def _other_selected_mesh(context: bpy.types.Context) -> Message | None:
-    """A selected mesh object beside the active one."""
+    """A message if no mesh object is selected beside the active one."""
     if set(mesh_objects(context.selected_objects)) - {context.active_object}:
         return None
     return Message("Select the target objects first, and last the object that has segments")

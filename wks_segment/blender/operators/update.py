@@ -11,7 +11,7 @@ from ._base import BaseOperator
 
 
 def _kept_job(context: bpy.types.Context) -> Message | None:
-    """Labels in this scene that are from the job that the session keeps."""
+    """A message if the labels in this scene are not from the job that the session keeps."""
     return None if session_of(context).holds(context.scene) else Message(NOTHING_TO_UPDATE)
 
 

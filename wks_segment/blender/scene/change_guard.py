@@ -13,7 +13,7 @@ from .characters import Character, Member
 from .topology import polygon_sizes
 
 
-class Watch:
+class ChangeGuard:
     """Remembers a scene and the meshes of characters as they are now, without references to Blender's data."""
 
     def __init__(self, scene: bpy.types.Scene, characters: Iterable[Character]) -> None:
@@ -23,15 +23,15 @@ class Watch:
             member: (_mesh_state(obj), _content(obj.data)) for member, obj in objects.items() if obj is not None
         }
 
-    def glance(self) -> None:
+    def check_quickly(self) -> None:
         """Raise ChangedError if a change can be seen without reading meshes: fast enough for many times a second."""
         self.scene()
         for member, (state, _) in self._states.items():
             _check_member(member, member.resolve(), state)
 
-    def look(self) -> None:
+    def check_fully(self) -> None:
         """Raise ChangedError also if coordinates or faces changed: slower, for once before something is written."""
-        self.glance()
+        self.check_quickly()
         for member, (_, content) in self._states.items():
             obj = member.resolve()
             if obj is not None and _content(obj.data) != content:

@@ -15,7 +15,7 @@ from ...core.progress import Progress
 from ..errors import UserError
 from ..props.preferences import model_folder
 from ..scene import poses as reader
-from ..scene.change_guard import Watch
+from ..scene.change_guard import ChangeGuard
 from ..scene.characters import group, selected_meshes
 from ..scene.pose_sources import active_character
 from ..scene.poses import Pose
@@ -109,7 +109,7 @@ class RankingJob:
 
     models: list[NamedModel]
     poses: list[Pose]
-    guard: Watch
+    guard: ChangeGuard
     report: Report
     cache: Cache
     ranking: Ranking | None = None
@@ -123,7 +123,7 @@ class RankingJob:
         with report.stage("read"):
             character = active_character(context, group(selected_meshes(context)))
             report.poses = reader.read_objects(context, [character])
-        return cls(models, report.poses, Watch(context.scene, [character]), report, cache)
+        return cls(models, report.poses, ChangeGuard(context.scene, [character]), report, cache)
 
     @property
     def model(self) -> PoseSegmentation:
@@ -139,7 +139,7 @@ class RankingJob:
 
     def write(self) -> Message:
         """Store the ranking in the scene and return the verdict; ChangedError if the scene has changed."""
-        self.guard.look()
+        self.guard.check_fully()
         assert self.ranking is not None
         settings = self.guard.scene().wks_segment
         names = [named.name for named in self.models]

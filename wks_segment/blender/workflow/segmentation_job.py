@@ -16,7 +16,7 @@ from ...core.progress import Progress
 from ..errors import UserError
 from ..props.settings import WKSSegmentSettings
 from ..scene import poses as reader
-from ..scene.change_guard import Watch
+from ..scene.change_guard import ChangeGuard
 from ..scene.characters import Character, group, mesh_objects, selected_meshes
 from ..scene.pose_sources import read_training_poses
 from ..scene.poses import Pose
@@ -46,7 +46,7 @@ class SegmentationJob:
         Meshes to learn from, or to apply the model to.
     request : LabelRequest
         Settings of the labels.
-    guard : Watch
+    guard : ChangeGuard
         Tells whether the scene is still as it was read.
     report : Report
     learns : bool
@@ -66,7 +66,7 @@ class SegmentationJob:
     model: PoseSegmentation
     poses: list[Pose]
     request: LabelRequest
-    guard: Watch
+    guard: ChangeGuard
     report: Report
     learns: bool
     number: int | Literal["auto"]
@@ -112,7 +112,7 @@ class SegmentationJob:
         settings, poses = context.scene.wks_segment, report.poses
         with report.stage("read"):
             characters = [pose.character for pose in poses]
-            request, guard = LabelRequest.of(settings, characters), Watch(context.scene, characters)
+            request, guard = LabelRequest.of(settings, characters), ChangeGuard(context.scene, characters)
         return cls(model, poses, request, guard, report, learns, settings.number(), cache)
 
     def with_settings(self, settings: WKSSegmentSettings) -> SegmentationJob:
@@ -124,7 +124,7 @@ class SegmentationJob:
             If the settings need another model, or the scene has changed.
         """
         first, number = self.first or self, settings.number()
-        first.guard.glance()
+        first.guard.check_quickly()
         report = Report(first.poses, first.report.laplacians)
         model = copy(first.model)
         model.smoothness = settings.smoothness
@@ -168,11 +168,11 @@ class SegmentationJob:
         follows : bool
             Whether the labels in the scene are from the same job, with other settings.
         """
-        self.guard.look()
+        self.guard.check_fully()
         settings = self.guard.scene().wks_segment
         # With another number of segments, or another model, a part can get another number.
         renumbered = self.learns or self.first is not None
-        # A job that does not follow is either new, or adjusted after its undo, which has removed its row as well.
+        # A row is added for a new job, and for a repeated one whose row was undone.
         adds = self.learns and not (self.first is not None and follows) and not settings.replace_model
         if adds:
             # Names and colors belong to the other model, and are stored before they are carried over to this one.
