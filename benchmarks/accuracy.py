@@ -61,7 +61,7 @@ def mesh_files(paths: Sequence[Path]) -> list[Path]:
 def compare(mesh: TriangleMesh) -> tuple[int, float, float, float, float]:
     """Number of vertices, error in percent, adjusted Rand index, CPU seconds of the fast and of the exact solver."""
     mesh = prepare_surface(mesh, VERTICES_PER_PAIR * N_PAIRS).mesh
-    n_pairs = N_PAIRS + int(mesh.components.max())
+    n_pairs = N_PAIRS + int(mesh.islands.max())
     start = time.process_time()
     truth = wave_kernel_signature(*eigenpairs(mesh, n_pairs, "exact"))
     between = time.process_time()

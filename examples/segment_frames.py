@@ -2,8 +2,8 @@
 
     blender --background --python-exit-code 1 --python examples/segment_frames.py -- walk.glb labeled.blend
 
-The same as the operators do in one call is written out here, so that you can change each step: other poses, another
-model, another use of the labels. Needs the installed extension, or `pip install -e .` in a Python with the bpy module.
+Writes out the main steps of the operators, so that you can change each: other poses, another model, another use of the
+labels. Needs the installed extension, or `pip install -e .` in a Python with the bpy module.
 The largest mesh of the file is used.
 """
 
@@ -54,9 +54,7 @@ def main(source: str, target: str) -> None:
         polygons.append(polygon_of)
 
     model = core.PoseSegmentation(n_segments=SEGMENTS)
-    described = [
-        model.describe(pose) for pose in poses
-    ]  # computes eigenpairs and signatures, which takes most of the time
+    described = model.describe_all(poses)  # computes eigenpairs and signatures, which takes most of the time
     model.fit(described)
     labels = model.segment_polygons(described, polygons)
 

@@ -169,7 +169,7 @@ class StopError(Exception):
     pass
 
 
-@pytest.mark.parametrize("stage", ["pose", "mixture", "parts", "regions"])
+@pytest.mark.parametrize("stage", ["pose", "mixture", "evaluating", "regions"])
 def test_error_from_progress_ends_a_fit_within_a_stage(stage):
     calls = []
 

@@ -15,7 +15,7 @@ import numpy as np
 from .labeling.region_atlas import RegionAtlas
 from .labeling.traits import FIELDS, PLANES
 from .learning.gaussian_mixture import CovarianceType, GaussianMixture
-from .learning.merge_tree import Grouping
+from .learning.merge_tree import MergeTree
 from .learning.parameters import PARAMETERS, check_parameters, effective
 from .learning.standardizer import LEAST_SPREAD, Standardizer
 from .mesh.triangle_mesh import FloatArray, IntArray
@@ -53,7 +53,7 @@ class ModelContent:
         Of the model, by name.
     mixture : GaussianMixture
     standardizer : Standardizer
-    grouping : Grouping or None
+    grouping : MergeTree or None
     atlases : (RegionAtlas, RegionAtlas) or None
         Of wholes and of segments.
     usual_scores : (poses,) array
@@ -63,7 +63,7 @@ class ModelContent:
     parameters: dict[str, Any]
     mixture: GaussianMixture
     standardizer: Standardizer
-    grouping: Grouping | None
+    grouping: MergeTree | None
     atlases: tuple[RegionAtlas, RegionAtlas] | None
     usual_scores: FloatArray
     part_notes: PartNotes
@@ -120,7 +120,7 @@ def decode(text: str) -> ModelContent:
     grouping, atlases = None, None
     if grouped:
         joins = arrays["joins"].astype(np.int64)
-        grouping = Grouping(joins, arrays["certainties"], arrays["by_chance"], arrays["cuts"])
+        grouping = MergeTree(joins, arrays["certainties"], arrays["by_chance"], arrays["cuts"])
         wholes, segments = (RegionAtlas.of_arrays(arrays, kind) for kind in REGION_KINDS)
         atlases = wholes, segments
     return ModelContent(

@@ -18,12 +18,12 @@ from .labeling.pose_labeling import PoseLabeling
 from .labeling.region_atlas import RegionAtlas
 from .learning.gaussian_mixture import CovarianceType, GaussianMixture
 from .learning.likelihood import comparable_score, usual_scores
-from .learning.merge_tree import Grouping
-from .learning.model_selection import mixture_and_grouping
+from .learning.merge_tree import MergeTree
+from .learning.model_selection import mixture_and_merge_tree
 from .learning.parameters import PARAMETERS, NSegments, Preset, check_parameters, effective
 from .learning.standardizer import Scaling, Standardizer
 from .learning.training_samples import TrainingSamples
-from .mesh.surface import Pieces
+from .mesh.surface import IslandMode
 from .mesh.triangle_mesh import FloatArray, TriangleMesh
 from .message import Message
 from .poses.pose_cache import AnyPose, Workpiece
@@ -53,7 +53,7 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
     n_segments : int or "auto"
         Number of segments, where left and right count as one. A segment is a group of components of the mixture; with
         the paper's setting, each component is a segment. "auto": the largest number whose certainty is close to the
-        best, see `Grouping.best_number`; not with the paper's setting.
+        best, see `MergeTree.best_number`; not with the paper's setting.
     covariance_type : "auto", "shared", "diag", "full", "tied" or "spherical"
         "shared" is one diagonal covariance for all components, which the paper proposes, and the most robust choice for
         bodies that were not learned. "auto" also tries "diag" and takes it if its labels agree far better between poses
@@ -76,8 +76,7 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
         The paper's cotangents on the triangles of the mesh, or on intrinsic Delaunay triangles between the same
         vertices (`delaunay`); "auto" takes the triangles of the mesh unless many of them are slivers.
     smoothness : float
-        How smooth borders are, and how large the smallest region is; 0: every vertex has the label of its own
-        signature.
+        How smooth borders are. At 0 each vertex keeps the label of its own signature, and the default `min_share` is 0.
     preset : "default" or "paper"
         "paper" overrides `covariance_type`, `scaling`, `laplacian` and `smoothness` by the setting of the paper.
 
@@ -89,8 +88,8 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
         Fitted to the signatures of the learned poses.
     centre_, spread_ : (n_energies,) arrays
         Mean and standard deviation of the scaled training signatures over the area.
-    grouping_ : Grouping or None
-        Order in which components are joined to segments; None with the paper's setting.
+    grouping_ : MergeTree or None
+        Order in which components are merged into segments; None with the paper's setting.
     regions_ : RegionAtlas or None
         Connected regions of the learned poses; None with the paper's setting.
     sides_ : RegionAtlas or None
@@ -98,10 +97,10 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
     n_segments_ : int
         Number of segments.
     usual_scores_ : (poses,) array
-        For each learned pose about the `comparable_score` that it would have, had it not been learned; for a single
-        pose, the score that it has.
+        Estimate of each learned pose's `comparable_score` under a model learned without it; for a single pose, the
+        score that it has.
     part_notes_ : PartNotes
-        Names and colors that a user gave to parts, and which parts are joined; only kept with the model.
+        Names and colors that a user gave to parts, and which parts are merged; only kept with the model.
     """
 
     usual_scores_: FloatArray
@@ -116,7 +115,7 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
         accuracy: Accuracy = "fast",
         random_state: int = 0,
         scaling: Scaling = "log",
-        pieces: Pieces = "joined",
+        pieces: IslandMode = "joined",
         laplacian: Literal["auto"] | Laplacian = "auto",
         smoothness: float = 1.0,
         preset: Preset = "default",
@@ -169,22 +168,22 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
         self._check_parameters()
         if not len(meshes):
             raise ValueError("there is no pose to learn from: pass at least one mesh, better three to five")
-        whole, parameters = Progress.of(progress), self._parameters()
-        poses = self._all_described(meshes, whole.part(0.0, DESCRIBED), cache)
-        whole(DESCRIBED, "mixture")
+        overall, parameters = Progress.of(progress), self._parameters()
+        poses = self._all_described(meshes, overall.part(0.0, DESCRIBED), cache)
+        overall(DESCRIBED, "mixture")
         training = TrainingSamples.of(poses, parameters)
-        signatures = [pose.pose for pose in poses]
-        mixture, grouping = mixture_and_grouping(
-            parameters, signatures, training, cache, whole.part(DESCRIBED, GROUPED)
+        signatures = [workpiece.pose for workpiece in poses]
+        mixture, grouping = mixture_and_merge_tree(
+            parameters, signatures, training, cache, overall.part(DESCRIBED, GROUPED)
         )
         atlases = None
         if grouping is not None:
             labeler = self._labeler_of(mixture, training.standardizer, grouping)
-            atlases = labeler.atlases(poses, rest, whole.part(GROUPED, 1.0, "regions"))
+            atlases = labeler.atlases(poses, rest, overall.part(GROUPED, 1.0, "regions"))
         scores = usual_scores(mixture, training)
         self._set_learned(mixture, training.standardizer, grouping, atlases, scores)
         self.part_notes_ = PartNotes()
-        whole(1.0, "done")
+        overall(1.0, "done")
         return self
 
     @one_blas_thread
@@ -215,10 +214,10 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
         poses: Sequence[AnyPose] = (),
         rest: TriangleMesh | None = None,
     ) -> PoseSegmentation:
-        """A copy of the model with another number of segments, at once: its components joined to as many groups.
+        """A copy of the model with another number of segments, at once: its components merged into as many groups.
 
         A new fit gives another result: it makes more components for more than eight segments, takes the mixture whose
-        groups agree best at this number, and joins segments that are only small regions at it. From eight to fewer
+        groups agree best at this number, and merges segments that are only small regions at it. From eight to fewer
         segments labels are much the same, to more they differ: docs/method.md has numbers.
 
         Parameters
@@ -318,7 +317,7 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
         self,
         mixture: GaussianMixture,
         standardizer: Standardizer,
-        grouping: Grouping | None,
+        grouping: MergeTree | None,
         atlases: tuple[RegionAtlas, RegionAtlas] | None,
         scores: FloatArray,
     ) -> None:

@@ -20,7 +20,7 @@ def creature(scene):
 def test_surface_is_one_closed_island_of_5_to_20_thousand_vertices(creature):
     (pose,) = reader.read_objects(bpy.context, [Character((creature,))])
     assert 5_000 <= pose.mesh.n_vertices <= 20_000
-    assert prepare_surface(pose.mesh).n_components == 1
+    assert prepare_surface(pose.mesh).n_islands == 1
     edges = np.sort(pose.mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     assert set(np.unique(edges, axis=0, return_counts=True)[1].tolist()) == {2}
     # Euler's formula for a sphere: no handles.

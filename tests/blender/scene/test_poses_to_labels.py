@@ -54,7 +54,7 @@ def test_seams_of_an_imported_file_are_no_borders(settings, tmp_path):
     assert split > 24 * 15 + 2, "the file has no seam: the test is void"
     (pose,) = reader.read_objects(bpy.context, [Character((sphere,))])
     described = settings.new_model().describe(pose.mesh)
-    assert described.surface.n_components == 1
+    assert described.surface.n_islands == 1
     assert len(described.surface.vertex_of) == split
     learn(settings, sphere, n_segments=3)
     labels = labels_of(sphere)

@@ -17,13 +17,13 @@ def limb(name, subdivisions=4, radius=0.15):
 
 
 @pytest.fixture(scope="module")
-def usual(model):
+def regions_at_rest(model):
     """Regions of the figure at rest."""
     return model.segment_regions(figure())
 
 
-def name_of(names, faces):
-    values, counts = np.unique(names[faces], return_counts=True)
+def number_of(numbers, faces):
+    values, counts = np.unique(numbers[faces], return_counts=True)
     return int(values[counts.argmax()])
 
 
@@ -33,48 +33,48 @@ def model():
     return PoseSegmentation(6, n_eigenpairs=100, n_energies=60).fit(poses)
 
 
-def test_left_and_right_are_two_regions_with_the_same_names_in_unseen_poses(model, usual):
+def test_left_and_right_are_two_regions_with_the_same_numbers_in_unseen_poses(model, regions_at_rest):
     for left, right in ((0.4, -0.4), (-0.5, 0.5), (0.0, 0.7)):
         mesh = figure(left, right)
         found = model.segment_regions(mesh)
-        assert np.average(found == usual, weights=mesh.face_areas) > 0.93
+        assert np.average(found == regions_at_rest, weights=mesh.face_areas) > 0.93
         for pair in (("left arm", "right arm"), ("left leg", "right leg")):
-            names = [name_of(found, limb(one)) for one in pair]
-            assert names == [name_of(usual, limb(one)) for one in pair]
-            assert names[0] != names[1]
+            numbers = [number_of(found, limb(one)) for one in pair]
+            assert numbers == [number_of(regions_at_rest, limb(one)) for one in pair]
+            assert numbers[0] != numbers[1]
 
 
-def test_names_are_the_same_on_another_meshing_elsewhere_and_inside_out(model, usual):
+def test_numbers_are_the_same_on_another_meshing_elsewhere_and_inside_out(model, regions_at_rest):
     fine = figure(0.3, -0.2, 5)
     turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
     order = np.random.default_rng(0).permutation(fine.n_vertices)
     moved = TriangleMesh(3 * (fine.vertices @ turn)[order] + 5, np.argsort(order)[fine.faces][:, ::-1])
     found = model.segment_regions(moved)
     for one in ("left arm", "right arm", "left leg", "right leg", "head"):
-        assert name_of(found, limb(one, 5)) == name_of(usual, limb(one))
+        assert number_of(found, limb(one, 5)) == number_of(regions_at_rest, limb(one))
 
 
 def test_mirrored_body_has_left_and_right_exchanged(model):
-    usual = model.segment_regions(figure(0.4, 0.0))
+    regions_at_rest = model.segment_regions(figure(0.4, 0.0))
     mesh = figure(0.4, 0.0)
     mirrored = model.segment_regions(TriangleMesh(mesh.vertices * (-1, 1, 1), mesh.faces[:, ::-1]))
-    assert name_of(mirrored, limb("left arm")) == name_of(usual, limb("right arm"))
-    assert name_of(mirrored, limb("right leg")) == name_of(usual, limb("left leg"))
+    assert number_of(mirrored, limb("left arm")) == number_of(regions_at_rest, limb("right arm"))
+    assert number_of(mirrored, limb("right leg")) == number_of(regions_at_rest, limb("left leg"))
 
 
-def test_left_is_in_the_direction_of_x(model, usual):
-    names, side = usual, model.regions_.side
+def test_left_is_in_the_direction_of_x(model, regions_at_rest):
+    numbers, side = regions_at_rest, model.regions_.side
     for one in ("arm", "leg"):
-        assert side[name_of(names, limb(f"left {one}"))] == 1
-        assert side[name_of(names, limb(f"right {one}"))] == -1
-    assert side[name_of(names, limb("head"))] == 0
+        assert side[number_of(numbers, limb(f"left {one}"))] == 1
+        assert side[number_of(numbers, limb(f"right {one}"))] == -1
+    assert side[number_of(numbers, limb("head"))] == 0
 
 
 def test_rest_pose_tells_left_from_right():
     turned = [TriangleMesh(mesh.vertices * (-1, -1, 1), mesh.faces) for mesh in (figure(0.2, 0.1), figure(0.5, 0.0))]
     fitted = PoseSegmentation(6, n_eigenpairs=100, n_energies=60).fit(turned, rest=figure())
-    names = fitted.segment_regions(turned[0])
-    assert fitted.regions_.side[name_of(names, limb("left arm"))] == 1
+    numbers = fitted.segment_regions(turned[0])
+    assert fitted.regions_.side[number_of(numbers, limb("left arm"))] == 1
     with pytest.raises(ValueError, match="rest has other faces than the first pose"):
         PoseSegmentation(6, n_eigenpairs=100, n_energies=60).fit(turned, rest=figure(subdivisions=3))
 
@@ -179,7 +179,7 @@ def test_sides_are_learned_from_bent_poses_alone():
     model = PoseSegmentation(6, n_eigenpairs=100, n_energies=60).fit(poses)
     regions = model.segment_regions(poses[0])
     for limbs, side in (("left arm", "left leg"), 1), (("right arm", "right leg"), -1):
-        assert {int(model.regions_.side[name_of(regions, limb(one))]) for one in limbs} == {side}
+        assert {int(model.regions_.side[number_of(regions, limb(one))]) for one in limbs} == {side}
 
 
 def test_regions_of_one_mesh_are_matched_by_their_order(model):

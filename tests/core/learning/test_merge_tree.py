@@ -3,7 +3,7 @@ import pytest
 from shapes import creature
 
 from wks_segment.core import PoseSegmentation, prepare_surface
-from wks_segment.core.learning.merge_tree import Contacts, Grouping, PoseGeometry
+from wks_segment.core.learning.merge_tree import Contacts, MergeTree, PoseGeometry
 
 # A row of four components with equal areas; the second and the third have hardly any border.
 ROW = np.zeros((4, 4))
@@ -20,19 +20,19 @@ def overlaps(areas, shared=0.02):
 
 
 def test_components_with_a_long_border_are_joined_first():
-    grouping = Grouping.of(Contacts(ROW, EVEN, overlaps(EVEN)))
-    assert grouping.pairs.tolist() == [[0, 1], [2, 3], [0, 2]]
-    assert grouping.groups(4).tolist() == [0, 3, 1, 2]
-    assert grouping.groups(3).tolist() == [0, 0, 1, 2]
-    assert grouping.groups(2).tolist() == [0, 0, 1, 1]
-    assert grouping.groups(1).tolist() == [0, 0, 0, 0]
+    tree = MergeTree.of(Contacts(ROW, EVEN, overlaps(EVEN)))
+    assert tree.pairs.tolist() == [[0, 1], [2, 3], [0, 2]]
+    assert tree.groups(4).tolist() == [0, 3, 1, 2]
+    assert tree.groups(3).tolist() == [0, 0, 1, 2]
+    assert tree.groups(2).tolist() == [0, 0, 1, 1]
+    assert tree.groups(1).tolist() == [0, 0, 0, 0]
 
 
 def test_one_group_more_splits_one_and_keeps_the_numbers_of_the_others():
     areas = np.array([0.1, 0.3, 0.4, 0.2])
-    grouping = Grouping.of(Contacts(ROW, areas, overlaps(areas)))
+    tree = MergeTree.of(Contacts(ROW, areas, overlaps(areas)))
     for count in (1, 2, 3):
-        coarse, fine = grouping.groups(count), grouping.groups(count + 1)
+        coarse, fine = tree.groups(count), tree.groups(count + 1)
         kept = fine < count
         np.testing.assert_array_equal(fine[kept], coarse[kept])
         (split,) = set(coarse[~kept])  # the new group is less than half of one old group
@@ -49,15 +49,15 @@ def test_first_join_lowers_the_sum_of_border_by_area_most():
 
     areas = np.array([0.4, 0.3, 0.2, 0.1])
     best = min([[0, 0, 1, 2], [0, 1, 1, 2], [0, 1, 2, 2]], key=total)
-    found = Grouping.of(Contacts(ROW, areas, overlaps(areas))).groups(3)
+    found = MergeTree.of(Contacts(ROW, areas, overlaps(areas))).groups(3)
     assert (found[:, None] == found).tolist() == (np.array(best)[:, None] == best).tolist()
 
 
 def test_small_and_scattered_components_are_joined_first():
     areas = np.array([0.5, 0.25, 0.245, 0.005])
-    assert Grouping.of(Contacts(ROW, areas, overlaps(areas, 0.001))).pairs[0].tolist() == [2, 3]
+    assert MergeTree.of(Contacts(ROW, areas, overlaps(areas, 0.001))).pairs[0].tolist() == [2, 3]
     scattered = np.array([False, False, True, False])
-    assert 2 in Grouping.of(Contacts(ROW, EVEN, overlaps(EVEN)), scattered).pairs[0]
+    assert 2 in MergeTree.of(Contacts(ROW, EVEN, overlaps(EVEN)), scattered).pairs[0]
 
 
 def test_components_that_replace_each_other_between_poses_are_joined():
@@ -67,7 +67,7 @@ def test_components_that_replace_each_other_between_poses_are_joined():
     expected = np.zeros((4, 4))
     expected[0, 3] = expected[3, 0] = 20 * 0.5 / 2
     np.testing.assert_allclose(contacts.borders - ROW, expected)
-    assert Grouping.of(contacts).pairs[0].tolist() == [0, 3]
+    assert MergeTree.of(contacts).pairs[0].tolist() == [0, 3]
 
 
 def test_components_without_borders_are_joined_by_overlap():
@@ -75,23 +75,23 @@ def test_components_without_borders_are_joined_by_overlap():
     areas = np.full(3, 1 / 3)
     shared = np.diag(areas - 0.01)
     shared[0, 2] = shared[2, 0] = 0.005
-    assert Grouping.of(Contacts(apart, areas, shared)).pairs[0].tolist() == [0, 2]
+    assert MergeTree.of(Contacts(apart, areas, shared)).pairs[0].tolist() == [0, 2]
 
 
 def test_certainty_is_one_for_certain_faces_and_zero_by_chance():
-    sure = Grouping.of(Contacts(ROW, EVEN, np.diag(EVEN)))
+    sure = MergeTree.of(Contacts(ROW, EVEN, np.diag(EVEN)))
     np.testing.assert_allclose(sure.curve(), [0, 1, 1, 1])
     assert sure.best_number() == 4
-    guessed = Grouping.of(Contacts(ROW, EVEN, np.outer(EVEN, EVEN)))
+    guessed = MergeTree.of(Contacts(ROW, EVEN, np.outer(EVEN, EVEN)))
     np.testing.assert_allclose(guessed.curve(), 0, atol=1e-12)
 
 
 def test_best_number_is_the_last_before_certainty_falls():
     # Components of one half cannot be told apart; the halves can be with certainty.
     halves = np.kron(np.eye(2), np.full((2, 2), 0.125))
-    grouping = Grouping.of(Contacts(ROW, EVEN, halves))
-    np.testing.assert_allclose(grouping.certainties[[1, 3]], [1, 0.5])
-    assert grouping.best_number() == 2
+    tree = MergeTree.of(Contacts(ROW, EVEN, halves))
+    np.testing.assert_allclose(tree.certainties[[1, 3]], [1, 0.5])
+    assert tree.best_number() == 2
 
 
 def test_contacts_measure_borders_on_the_surface():

@@ -14,15 +14,15 @@ def ball(x, y=0.0, z=0.0, size=1.0, subdivisions=3):
 
 def tied_islands(connection, faces):
     """Pairs of islands that are tied."""
-    island = TriangleMesh(np.random.default_rng(0).random((faces.max() + 1, 3)), faces).components
+    island = TriangleMesh(np.random.default_rng(0).random((faces.max() + 1, 3)), faces).islands
     return {tuple(sorted(pair)) for pair in island[connection.ties].tolist()}
 
 
 def test_a_row_of_balls_is_tied_into_a_chain():
     row = together(*(ball(2.1 * i) for i in (0, 2, 1, 3)))
     assert tied_islands(connect(row), row.faces) == {(0, 2), (1, 2), (1, 3)}
-    assert prepare_surface(row).n_components == 1
-    assert prepare_surface(row, pieces="separate").n_components == 4
+    assert prepare_surface(row).n_islands == 1
+    assert prepare_surface(row, pieces="separate").n_islands == 4
 
 
 def test_islands_are_tied_where_they_stay_near_and_not_where_they_meet_in_one_pose():
@@ -63,5 +63,5 @@ def test_hundreds_of_distant_islands_are_tied():
     generator = np.random.default_rng(0)
     mesh = together(*(ball(*generator.uniform(0, 200, 3), 0.5, 2) for _ in range(300)))
     connection = connect(mesh)
-    assert prepare_surface(mesh, connection=connection).n_components == 1
+    assert prepare_surface(mesh, connection=connection).n_islands == 1
     assert len(tied_islands(connection, mesh.faces)) == 299

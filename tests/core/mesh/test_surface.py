@@ -9,7 +9,7 @@ def test_a_triangle_soup_is_welded_to_the_closed_surface():
     sphere = icosphere(2)
     surface = prepare_surface(split_at_every_corner(sphere))
     assert surface.mesh.n_vertices == sphere.n_vertices
-    assert surface.n_components == 1
+    assert surface.n_islands == 1
 
 
 def test_a_seam_is_welded_in_spite_of_rounding():
@@ -30,7 +30,7 @@ def test_surfaces_that_only_touch_are_not_welded():
     # Two closed spheres that touch in a point, as lips or a hand on the hip do: no open border, so no seam.
     a = icosphere(2)
     b = TriangleMesh(a.vertices + (a.vertices[0] - a.vertices[3]), a.faces)
-    assert prepare_surface(together(a, b), pieces="separate").n_components == 2
+    assert prepare_surface(together(a, b), pieces="separate").n_islands == 2
 
 
 def test_values_return_to_the_original_vertices():
@@ -79,7 +79,7 @@ def test_vertices_shrunk_to_a_point_become_one():
     hidden = vertices[:, 2] > 0.7
     vertices[hidden] = (0, 0, 0.7)
     surface = prepare_surface(TriangleMesh(vertices, sphere.faces), 3000)
-    assert surface.n_components == 1
+    assert surface.n_islands == 1
     assert np.unique(surface.vertex_of[hidden]).size == 1
 
 
@@ -87,14 +87,14 @@ def test_islands_that_touch_in_some_poses_are_not_welded():
     upper, lower = grid(8, 8), grid(8, 8)
     touching = together(upper, TriangleMesh(lower.vertices + (1, 0, 0), lower.faces))
     apart = together(upper, TriangleMesh(lower.vertices + (1.5, 0, 0), lower.faces))
-    assert prepare_surface(touching).n_components == 1
-    assert prepare_surface(touching, connection=connect(touching, apart, pieces="separate")).n_components == 2
+    assert prepare_surface(touching).n_islands == 1
+    assert prepare_surface(touching, connection=connect(touching, apart, pieces="separate")).n_islands == 2
 
 
 def test_tiny_islands_are_left_out_and_take_the_nearest_value():
     speck = TriangleMesh(0.005 * icosphere(0).vertices + (1.01, 0, 0), icosphere(0).faces)
     surface = prepare_surface(together(icosphere(3), *[speck] * 30))
-    assert surface.n_components == 1
+    assert surface.n_islands == 1
     values = surface.to_vertices(surface.mesh.vertices)
     assert np.abs(values[-12:] - (1, 0, 0)).max() < 0.1
     assert surface.to_faces(surface.mesh.vertices).shape == (icosphere(3).n_faces + 600, 3)
@@ -102,5 +102,5 @@ def test_tiny_islands_are_left_out_and_take_the_nearest_value():
 
 def test_a_mesh_of_many_small_islands_is_a_surface():
     cards = [TriangleMesh(grid(1, 1).vertices + (2 * i, 0, 0), grid(1, 1).faces) for i in range(1500)]
-    assert prepare_surface(together(*cards), pieces="separate").n_components == 100
-    assert prepare_surface(together(*cards)).n_components == 1
+    assert prepare_surface(together(*cards), pieces="separate").n_islands == 100
+    assert prepare_surface(together(*cards)).n_islands == 1

@@ -4,7 +4,7 @@ from scipy.sparse import csr_matrix
 from shapes import creature, grid, icosphere, together
 
 from wks_segment.core import TriangleMesh, stiffness_matrix
-from wks_segment.core.mesh.triangle_mesh import components_of_pairs
+from wks_segment.core.mesh.triangle_mesh import connected_groups
 from wks_segment.core.spectral.coarsening import HEAVIEST_CELL, Level, cluster_vertices, coarse_eigenpairs, graph_edges
 
 
@@ -25,7 +25,7 @@ def test_cells_are_connected_not_too_heavy_and_as_many_as_asked_for(mesh):
     mass = np.bincount(cell, weights=mesh.vertex_areas)
     assert mass.max() <= HEAVIEST_CELL / 200 + mesh.vertex_areas.max()
     inside = cell[a] == cell[b]
-    assert components_of_pairs(np.stack([a[inside], b[inside]], axis=1), mesh.n_vertices).max() + 1 == count
+    assert connected_groups(np.stack([a[inside], b[inside]], axis=1), mesh.n_vertices).max() + 1 == count
 
 
 def test_cells_do_not_span_two_nearby_sheets():

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
-from ...core.mesh.triangle_mesh import FloatArray, IntArray, components_of_pairs
+from ...core.mesh.triangle_mesh import FloatArray, IntArray, connected_groups
 from ..scene.attributes import read_floats
 from ..scene.characters import Character, polygon_ranges
 from ..scene.mesh_arrays import Body
@@ -41,7 +41,7 @@ def _regions(character: Character, part: int, least_share: float) -> IntArray:
     if not len(polygons):
         return result
     inside = pairs[(labels[pairs] == part).all(axis=1)]
-    _, component = np.unique(components_of_pairs(inside, count)[polygons], return_inverse=True)
+    _, component = np.unique(connected_groups(inside, count)[polygons], return_inverse=True)
     component = component.ravel()
     area = np.bincount(component, weights=areas[polygons])
     order = np.argsort(-area, kind="stable")

@@ -1,4 +1,4 @@
-"""Greedy joining of groups on a surface: what a join gains, and tables of pairs after a join.
+"""Greedy merging of groups on a surface: what a merge gains, and tables of pairs after a merge.
 
 Used by the normalized cuts of one pose and by the merge tree of mixture components. Both keep (r, r) tables with a row
 and a column for each group.
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from ..mesh.triangle_mesh import FloatArray, IntArray
 
 
-def gains_of_joining(cut: FloatArray, border: FloatArray, area: FloatArray, rows: IntArray | None = None) -> FloatArray:
-    """Decrease of the sum over all groups of border length by area, for each pair of groups that could be joined.
+def gains_of_merging(cut: FloatArray, border: FloatArray, area: FloatArray, rows: IntArray | None = None) -> FloatArray:
+    """Decrease of the sum over all groups of border length by area, for each pair of groups that could be merged.
 
     Parameters
     ----------
@@ -33,11 +33,11 @@ def gains_of_joining(cut: FloatArray, border: FloatArray, area: FloatArray, rows
     """
     selected = slice(None) if rows is None else rows
     alone = (border / area)[selected, None] + border / area
-    joined = (border[selected, None] + border - 2 * cut[selected]) / (area[selected, None] + area)
-    return np.asarray(alone - joined)
+    merged = (border[selected, None] + border - 2 * cut[selected]) / (area[selected, None] + area)
+    return np.asarray(alone - merged)
 
 
-def join_in_table(table: NDArray[Any], kept: int, absorbed: int) -> None:
+def merge_in_table(table: NDArray[Any], kept: int, absorbed: int) -> None:
     """Add the row and column of one group of a symmetric table to those of another, in place; the first become 0.
 
     For a table of truth values, the sum is "or". The diagonal entry becomes a sum of inner entries.

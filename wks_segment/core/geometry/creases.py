@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from ..mesh.adjacency import FaceAdjacency
 from ..mesh.surface import Surface, indicator
-from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray, components_of_pairs, unique_edges
+from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray, connected_groups, unique_edges
 from ..progress import Progress
 from .heat_flow import Flows, HeatFlow
 
@@ -60,7 +60,7 @@ def outward_signs(faces: IntArray, corners: FloatArray) -> FloatArray:
     turned = rising[first] == rising[second]
     # Each face has a front (its own number) and a back (plus m); those of neighbors on one side of the surface connect.
     near, far = np.concatenate([a, a + m]), np.concatenate([np.where(turned, b + m, b), np.where(turned, b, b + m)])
-    layer = components_of_pairs(np.stack([near, far], axis=1), 2 * m)
+    layer = connected_groups(np.stack([near, far], axis=1), 2 * m)
     sign = np.where(layer[:m] <= layer[m:], 1.0, -1.0)
     island = np.minimum(layer[:m], layer[m:])
     middle = corners.reshape(-1, 3).mean(axis=0)

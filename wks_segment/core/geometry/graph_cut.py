@@ -23,14 +23,15 @@ from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 CUT_CREASE, CUT_MOST_CONCAVE, CUT_MOST_CONVEX = 0.05, 15.0, 0.0
 """A border is weighted by `exp(CUT_CREASE * clip(curvature, -CUT_MOST_CONCAVE, CUT_MOST_CONVEX))`. A crease weight of
 0.4 agrees best with people, but creases come and go with the pose, so that segments would differ between poses ("then
-borders cut" in docs/dev/experiments.md) …"""
+borders cut" in docs/dev/experiments.md)."""
 CUT_STRENGTH = 2.0
 """Cost of a border by its length, in units of the smoothing length (same table). Below, borders stay where noise puts
 them."""
 CUT_WIDTH = 1.0
 """Distance that a label may spread from the faces that have it, in units of the smoothing length."""
 REGION_CREASE, REGION_WIDTH = 0.4, 2.0
-"""… while regions, of which there are fewer, do not, so they are cut with the crease weight that agrees with people."""
+"""Crease weight and width for cutting regions. There are few of them, and they stay the same between poses also
+with the crease weight that agrees best with people."""
 LEAST_POSTERIOR = 1e-3
 """Least posterior in the energy: a label of posterior 0 must not cost infinitely much."""
 LARGEST_COST = 2.0**29
@@ -55,7 +56,7 @@ class CutStyle:
         How much creases attract borders; see `CUT_CREASE`.
     width : float
         Distance that labels may spread, in units of `length`. It is measured between centers of faces, so that nothing
-        changes on a mesh whose faces are further apart.
+        changes on a mesh whose faces are farther apart.
     strength : float
         Cost of a border by its length, in units of `length`. With 0, the labels at the start stay.
     """

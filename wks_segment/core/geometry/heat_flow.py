@@ -13,7 +13,7 @@ from scipy.sparse.linalg import splu
 from ..mesh.triangle_mesh import FloatArray, TriangleMesh
 from ..spectral.coarsening import Level
 from ..spectral.laplacian import stiffness_matrix, unit_area_masses
-from ..spectral.multifrontal import Dissection, NestedDissectionFactor, SingularError, nested_dissection
+from ..spectral.multifrontal import Dissection, MultifrontalFactor, SingularError, nested_dissection
 
 CELLS_ABOVE = 200_000
 """Number of vertices above which values are smoothed on cells: a factor grows faster than the mesh."""
@@ -54,9 +54,9 @@ class HeatFlow:
             self._mass = csr_matrix(self._prolongation.T @ self._mass)
         else:
             dissection = system.dissection
-        factor: NestedDissectionFactor | None
+        factor: MultifrontalFactor | None
         try:
-            factor = NestedDissectionFactor(_matrix(level, length), level.positions, dissection=dissection)
+            factor = MultifrontalFactor(_matrix(level, length), level.positions, dissection=dissection)
         except SingularError:
             factor = None
         if factor is not None and not factor.n_negative:

@@ -13,8 +13,8 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..mesh.adjacency import FaceAdjacency
 from ..mesh.surface import Surface
-from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray, components_of_pairs
-from .agglomeration import gains_of_joining, join_in_table
+from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray, connected_groups
+from .agglomeration import gains_of_merging, merge_in_table
 from .creases import MOST_CONCAVE
 
 PATCHES = 250
@@ -82,7 +82,7 @@ def normalized_cut(
     area = np.maximum(np.bincount(patch, weights=areas, minlength=count), 1e-12)
     owner = np.arange(count)
     # Patches that are not connected are never joined: a thousand islands need a thousand small tables, not a large one.
-    connected = components_of_pairs(np.stack([a, b], axis=1), count)
+    connected = connected_groups(np.stack([a, b], axis=1), count)
     order = np.argsort(connected, kind="stable")
     for patches in np.split(order, np.flatnonzero(np.diff(connected[order])) + 1):
         if len(patches) > 1:
@@ -96,7 +96,7 @@ def _greedily_joined(cut: FloatArray, touch: BoolArray, area: FloatArray, least_
     """(r,) patch whose part each of r patches ends up in, given weighted borders, neighbors and areas."""
     count = len(area)
     area, border = area.copy(), cut.sum(axis=1)
-    gains = np.where(touch, gains_of_joining(cut, border, area), -np.inf)
+    gains = np.where(touch, gains_of_merging(cut, border, area), -np.inf)
     owner = np.arange(count)
     for _ in range(count - 1):
         i, j = divmod(int(gains.argmax()), count)
@@ -105,11 +105,11 @@ def _greedily_joined(cut: FloatArray, touch: BoolArray, area: FloatArray, least_
         owner[owner == i] = j
         area[j] += area[i]
         for table in (cut, touch):
-            join_in_table(table, j, i)
+            merge_in_table(table, j, i)
             table[j, j] = 0
         border[j], border[i] = cut[j].sum(), 0
         gains[i] = gains[:, i] = -np.inf
-        gains[j] = np.where(touch[j], gains_of_joining(cut, border, area, np.array([j]))[0], -np.inf)
+        gains[j] = np.where(touch[j], gains_of_merging(cut, border, area, np.array([j]))[0], -np.inf)
         gains[:, j] = gains[j]
     return owner
 
@@ -130,7 +130,7 @@ def _patches(surface: Surface, adjacency: FaceAdjacency, curvature: FloatArray) 
         offset = centers - centers[seeds[-1]]
         np.minimum(distance, np.einsum("ij,ij->i", offset, offset), out=distance)
         seeds.append(int(distance.argmax()))
-    first_faces = np.unique(components_of_pairs(adjacency.pairs, m), return_index=True)[1]
+    first_faces = np.unique(connected_groups(adjacency.pairs, m), return_index=True)[1]
     sources = np.unique(np.append(seeds, first_faces))
     nearest = dijkstra(graph, indices=sources, min_only=True, return_predecessors=True)[2]
     return np.asarray(np.unique(nearest, return_inverse=True)[1])

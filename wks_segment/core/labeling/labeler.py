@@ -14,12 +14,13 @@ import numpy as np
 from ..geometry.graph_cut import REGION_CREASE, REGION_WIDTH, CutStyle
 from ..learning.candidates import of_one_mesh
 from ..learning.gaussian_mixture import GaussianMixture
-from ..learning.merge_tree import Grouping
+from ..learning.merge_tree import MergeTree
 from ..learning.model_selection import MIN_SHARE
 from ..learning.standardizer import Standardizer
 from ..mesh.adjacency import FaceAdjacency
 from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
 from ..poses.pose_cache import Kind, ResultKey, Workpiece
+from ..poses.pose_signature import PoseSignature
 from ..progress import Progress
 from .polygons import Cleaning, PolygonMesh
 from .region_atlas import RegionAtlas
@@ -49,7 +50,7 @@ class Labeler:
         With K components.
     standardizer : Standardizer
         From the signature of a pose to the space of the mixture.
-    grouping : Grouping or None
+    grouping : MergeTree or None
         None: each component is a segment.
     n_segments : int
     length : float
@@ -58,7 +59,7 @@ class Labeler:
 
     mixture: GaussianMixture
     standardizer: Standardizer
-    grouping: Grouping | None
+    grouping: MergeTree | None
     n_segments: int
     length: float
 
@@ -71,7 +72,7 @@ class Labeler:
         """(n', K) posteriors of the components at the vertices of the surface of a pose."""
         return self.mixture.posteriors(self.standardizer.transform(pose.signature))
 
-    def joined(self, posteriors: FloatArray, n_groups: int | None = None) -> FloatArray:
+    def merged(self, posteriors: FloatArray, n_groups: int | None = None) -> FloatArray:
         """(…, n_groups) sums of (…, K) posteriors over the components of each group; of each segment if not given."""
         if self.grouping is None:
             return posteriors
@@ -84,12 +85,12 @@ class Labeler:
         Posteriors of components are kept with the pose: they are the same for every number of groups.
         """
         if not self._keeps(len(pose.signature)):
-            return self._smooth(pose, self.joined(self.posteriors(pose), n_groups))
+            return self._smooth(pose, self.merged(self.posteriors(pose), n_groups))
         raw = pose.results.get(ResultKey(Kind.POSTERIORS), (self.mixture,), lambda: self.posteriors(pose))
         smooth = pose.results.get(
             ResultKey(Kind.SMOOTH_POSTERIORS), (self.mixture, self.length), lambda: self._smooth(pose, raw)
         )
-        return smooth if n_groups is None else self.joined(smooth, n_groups)
+        return smooth if n_groups is None else self.merged(smooth, n_groups)
 
     def segments(
         self,
@@ -108,10 +109,10 @@ class Labeler:
         cleaning = Cleaning(CutStyle(self.length), min_share, STRAY_SHARE if min_share > 0 else 0.0)
         return mesh.labels(poses, posteriors, cleaning, marked)
 
-    def named_regions(self, atlas: RegionAtlas, pose: Workpiece, min_share: float) -> IntArray:
+    def numbered_regions(self, atlas: RegionAtlas, pose: Workpiece, min_share: float) -> IntArray:
         """(m,) region of each face, numbered as in the atlas; regions that were not learned have higher numbers."""
         regions = self._regions(atlas.n_groups, [pose], min_share, Progress())
-        return regions.numbered(atlas.named(self._traits(regions, pose, 1)), len(atlas.side))
+        return regions.numbered(atlas.numbers_of(self._traits(regions, pose, 1)), len(atlas.side))
 
     def atlases(
         self,
@@ -161,8 +162,8 @@ class Labeler:
         votes: list[IntArray] = []
         for together, step in _steps([poses[i] for i in voters], progress):
             regions = self._regions(atlas.n_groups, together, self.min_share, step.part(0.0, LABELS_SHARE))
-            names = atlas.named(mean_traits([self._traits(regions, pose, len(together)) for pose in together]))
-            side_of_face = atlas.sides_of(regions.numbered(names, len(atlas.side)))
+            numbers = atlas.numbers_of(mean_traits([self._traits(regions, pose, len(together)) for pose in together]))
+            side_of_face = atlas.sides_of(regions.numbered(numbers, len(atlas.side)))
             for pose, _ in step.part(LABELS_SHARE, 1.0).each(together):
                 field = _side_field(pose, regions, atlas, side_of_face)
                 votes.append(_sides_in_pose(pose, field, polygons[voters[len(votes)]], labels))
@@ -195,13 +196,13 @@ class Labeler:
             labels, neighbors = mesh.labels(poses, posteriors, cleaning)
             return Regions.of(labels, neighbors, poses[0].surface.original)
 
-        inputs = self.mixture, self.grouping, n_groups, self.length, min_share, *(pose.pose for pose in poses)
+        inputs = self.mixture, self.grouping, n_groups, self.length, min_share, *_pose_signatures(poses)
         return poses[0].results.get(ResultKey(Kind.REGIONS, len(poses)), inputs, compute)
 
     def _polygon_mesh(self, poses: Sequence[Workpiece], polygons: Sequence[IntArray] | None) -> PolygonMesh:
         # Results about all poses of a mesh are kept with the first one.
         key = ResultKey(Kind.POLYGON_MESH, len(poses), polygons is not None)
-        inputs = (*(pose.pose for pose in poses), *(polygons or ()))
+        inputs = (*_pose_signatures(poses), *(polygons or ()))
         return poses[0].results.get(key, inputs, lambda: PolygonMesh(poses, polygons))
 
     def _mean_posteriors(
@@ -215,7 +216,7 @@ class Labeler:
             (mesh, self.mixture, self.length),
             lambda: mesh.mean(poses, lambda pose: self.smoothed(pose, None), progress),
         )
-        return self.joined(of_components, n_groups)
+        return self.merged(of_components, n_groups)
 
     def _keeps(self, count: int) -> bool:
         """Whether posteriors of components at this many places are kept."""
@@ -240,9 +241,14 @@ class Labeler:
         return np.pad(fields, ((0, 0), (0, FIELDS - axes.shape[1])))
 
 
+def _pose_signatures(poses: Sequence[Workpiece]) -> list[PoseSignature]:
+    """The described poses without their intermediate results."""
+    return [workpiece.pose for workpiece in poses]
+
+
 def _steps(poses: Sequence[Workpiece], progress: Progress) -> list[tuple[Sequence[Workpiece], Progress]]:
     """Poses whose regions are found together, all with the same faces or each by itself, and the progress of each."""
-    if of_one_mesh([pose.pose for pose in poses]):
+    if of_one_mesh(_pose_signatures(poses)):
         return [(poses, progress)]
     return [([pose], progress.part(i / len(poses), (i + 1) / len(poses))) for i, pose in enumerate(poses)]
 

@@ -10,7 +10,7 @@ from sklearn.exceptions import NotFittedError
 
 from ..learning.candidates import SMOOTHING_LENGTH
 from ..learning.gaussian_mixture import GaussianMixture
-from ..learning.merge_tree import Grouping
+from ..learning.merge_tree import MergeTree
 from ..learning.standardizer import Standardizer
 from ..mesh.adjacency import connected_regions
 from ..mesh.triangle_mesh import FloatArray, IntArray
@@ -29,7 +29,7 @@ class PoseLabeling(PoseDescriber):
     n_segments: int | Literal["auto"]
     mixture_: GaussianMixture
     standardizer_: Standardizer
-    grouping_: Grouping | None
+    grouping_: MergeTree | None
     regions_: RegionAtlas | None
     sides_: RegionAtlas | None
 
@@ -46,7 +46,7 @@ class PoseLabeling(PoseDescriber):
     def predict_proba(self, mesh: AnyPose) -> FloatArray:
         """(n, n_segments) posterior of each segment at each vertex; rows sum to 1."""
         labeler, pose = self._labeler(), self._described(mesh)
-        return pose.surface.to_vertices(labeler.joined(labeler.posteriors(pose)))
+        return pose.surface.to_vertices(labeler.merged(labeler.posteriors(pose)))
 
     @one_blas_thread
     def predict_soft(self, mesh: AnyPose) -> FloatArray:
@@ -81,7 +81,7 @@ class PoseLabeling(PoseDescriber):
         labeler, pose, share = self._labeler(), self._described(mesh), self._min_share(min_share)
         if self.regions_ is None:
             return connected_regions(*labeler.segments([pose], None, share, Progress()))
-        return labeler.named_regions(self.regions_, pose, share)
+        return labeler.numbered_regions(self.regions_, pose, share)
 
     @one_blas_thread
     def segment_polygons(
@@ -204,9 +204,9 @@ class PoseLabeling(PoseDescriber):
         mixture = self._fitted()
         return self._labeler_of(mixture, self.standardizer_, self.grouping_)
 
-    def _labeler_of(self, mixture: GaussianMixture, standardizer: Standardizer, grouping: Grouping | None) -> Labeler:
+    def _labeler_of(self, mixture: GaussianMixture, standardizer: Standardizer, grouping: MergeTree | None) -> Labeler:
         length = float(self._effective("smoothness") * SMOOTHING_LENGTH)
         return Labeler(mixture, standardizer, grouping, self._number_of_segments(mixture, grouping), length)
 
-    def _number_of_segments(self, mixture: GaussianMixture, grouping: Grouping | None) -> int:
+    def _number_of_segments(self, mixture: GaussianMixture, grouping: MergeTree | None) -> int:
         return len(mixture.weights) if grouping is None else grouping.number_of(self.n_segments)

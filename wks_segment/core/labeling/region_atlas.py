@@ -1,4 +1,4 @@
-"""The learned regions, and which of them each region of a pose is: the same name in every pose and on every meshing."""
+"""The learned regions, and which of them each region of a pose is: the same in every pose and on every meshing."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from ..mesh.triangle_mesh import FloatArray, IntArray
 from .matching import matched
 from .sides import region_sides
-from .traits import Traits, deviation_of_named, mean_of_named
+from .traits import Traits, deviation_of_numbered, mean_of_numbered
 
 USUAL_NOISE = {"area": 0.5, "signature": 0.5, "handedness": 0.5, "distance": 0.1}
 """Standard deviation of traits from pose to pose, if only one pose was learned: of the logarithm of the area, of the
@@ -58,25 +58,25 @@ class RegionAtlas:
         atlas = cls(n_groups, poses[0], side, _in_units(USUAL_NOISE, poses[0]))
         # The mean over poses recognizes regions of each pose more reliably than the first pose alone.
         for _ in range(2):
-            names = [np.arange(len(pose.segment)) if alike else atlas.named(pose) for pose in poses]
-            mean = mean_of_named(atlas.traits, poses, names)
+            numbers = [np.arange(len(pose.segment)) if alike else atlas.numbers_of(pose) for pose in poses]
+            mean = mean_of_numbered(atlas.traits, poses, numbers)
             noise = _in_units(USUAL_NOISE, mean)
             if len(poses) > 1:
-                noise = np.maximum(deviation_of_named(mean, poses, names), _in_units(LEAST_NOISE, mean))
+                noise = np.maximum(deviation_of_numbered(mean, poses, numbers), _in_units(LEAST_NOISE, mean))
             atlas = cls(n_groups, mean, side, noise)
         return replace(atlas, side=region_sides(centers, poses[0].segment, atlas.mirrored()))
 
-    def named(self, traits: Traits) -> IntArray:
+    def numbers_of(self, traits: Traits) -> IntArray:
         """(r',) number of the learned region that each region of a pose is; new regions get numbers from r."""
         return matched(self.traits, traits, self.noise)
 
-    def sides_of(self, names: IntArray) -> IntArray:
+    def sides_of(self, numbers: IntArray) -> IntArray:
         """Side of each region by its number; 0 for a region that was not learned."""
-        return np.where(names < len(self.side), self.side[np.minimum(names, len(self.side) - 1)], 0)
+        return np.where(numbers < len(self.side), self.side[np.minimum(numbers, len(self.side) - 1)], 0)
 
     def mirrored(self) -> IntArray:
         """(r,) region that each region becomes in the mirror image of the character; r or more for none."""
-        return self.named(replace(self.traits, handedness=-self.traits.handedness))
+        return self.numbers_of(replace(self.traits, handedness=-self.traits.handedness))
 
     def arrays(self, kind: str) -> dict[str, FloatArray | IntArray]:
         """Arrays for a model file; each name begins with the kind of region. `of_arrays` reads them."""

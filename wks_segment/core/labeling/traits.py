@@ -73,14 +73,14 @@ class Regions:
         centers = sums / np.bincount(self.region, weights, count)[:, None]
         return np.asarray(centers[: len(self.segment)] - (middle, 0, 0))
 
-    def numbered(self, names: IntArray, n_known: int) -> IntArray:
-        """(m,) name of the region of each face, given the names of the r largest regions.
+    def numbered(self, numbers: IntArray, n_known: int) -> IntArray:
+        """(m,) number of the region of each face, given the numbers of the r largest regions.
 
-        All others get new names, from `n_known` or the highest given name.
+        All others get new numbers, from `n_known` or above the highest given number.
         """
-        n_unnamed = int(self.region.max()) + 1 - len(names)
-        first = max(n_known, int(names.max()) + 1)
-        return np.append(names, first + np.arange(n_unnamed))[self.region]
+        n_others = int(self.region.max()) + 1 - len(numbers)
+        first = max(n_known, int(numbers.max()) + 1)
+        return np.append(numbers, first + np.arange(n_others))[self.region]
 
 
 @dataclass(frozen=True)
@@ -144,18 +144,18 @@ class Traits:
 
 def mean_traits(poses: Sequence[Traits]) -> Traits:
     """Mean over poses that have the same regions in the same order."""
-    return mean_of_named(poses[0], poses, [np.arange(len(poses[0].segment))] * len(poses))
+    return mean_of_numbered(poses[0], poses, [np.arange(len(poses[0].segment))] * len(poses))
 
 
-def mean_of_named(first: Traits, poses: Sequence[Traits], names: Sequence[IntArray]) -> Traits:
-    """Mean over poses of the traits of each region of the first one, given the names of the regions in each pose."""
+def mean_of_numbered(first: Traits, poses: Sequence[Traits], numbers: Sequence[IntArray]) -> Traits:
+    """Mean over poses of the traits of each region of the first one, given the numbers of the regions in each pose."""
     count = len(first.segment)
     area, signature, handedness = np.zeros(count), np.zeros((count, FIELDS)), np.zeros((count, PLANES))
     times_seen, distance = np.zeros(count), np.zeros((count, count))
     times_both_seen = np.zeros((count, count))
-    for pose, name in zip(poses, names, strict=True):
-        known = np.flatnonzero(name < count)
-        at = name[known]
+    for pose, number in zip(poses, numbers, strict=True):
+        known = np.flatnonzero(number < count)
+        at = number[known]
         times_seen[at] += 1
         area[at] += np.log(pose.area[known])
         signature[at] += pose.signature[known]
@@ -172,13 +172,13 @@ def mean_of_named(first: Traits, poses: Sequence[Traits], names: Sequence[IntArr
     )
 
 
-def deviation_of_named(mean: Traits, poses: Sequence[Traits], names: Sequence[IntArray]) -> FloatArray:
+def deviation_of_numbered(mean: Traits, poses: Sequence[Traits], numbers: Sequence[IntArray]) -> FloatArray:
     """(4,) standard deviation over regions and poses of log area, signature, handedness and distance."""
     squares, count = np.zeros(4), len(mean.segment)
     times_seen = np.zeros(2)
-    for pose, name in zip(poses, names, strict=True):
-        known = np.flatnonzero(name < count)
-        at = name[known]
+    for pose, number in zip(poses, numbers, strict=True):
+        known = np.flatnonzero(number < count)
+        at = number[known]
         both = np.ix_(known, known), np.ix_(at, at)
         squares += (
             np.sum((np.log(pose.area[known]) - np.log(mean.area[at])) ** 2),

@@ -1,1 +1,1 @@
-"""Learning of segments from described poses: Gaussian mixtures, their choice, and the joining of components."""
+"""Learning of segments from described poses: Gaussian mixtures, their choice, and the merging of components."""

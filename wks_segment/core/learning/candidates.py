@@ -68,17 +68,17 @@ class CandidateSet:
     ----------
     geometries
         Of each pose.
-    candidates
-        At least one.
+    members
+        The candidates, at least one.
     """
 
     geometries: Sequence[PoseGeometry]
-    candidates: Sequence[Candidate]
+    members: Sequence[Candidate]
 
     @property
     def one_mesh(self) -> bool:
         """Whether the training poses are several poses of one mesh."""
-        return len(self.candidates[0].samples) > 0
+        return len(self.members[0].samples) > 0
 
     @classmethod
     def of(
@@ -116,7 +116,7 @@ class CandidateSet:
         arrays: dict[str, NDArray[Any]] = {"compared": np.array(self.one_mesh)}
         for i, geometry in enumerate(self.geometries):
             arrays |= {f"lengths_{i}": geometry.lengths, f"part_{i}": geometry.cuts}
-        for j, candidate in enumerate(self.candidates):
+        for j, candidate in enumerate(self.members):
             arrays[f"type_{j}"] = np.array(_TYPES.index(candidate.mixture.covariance_type))
             arrays |= {f"{name}_{j}": getattr(candidate.mixture, name) for name in _MIXTURE_ARRAYS}
             arrays |= {f"{name}_{j}": getattr(candidate.contacts, name) for name in _CONTACT_ARRAYS}

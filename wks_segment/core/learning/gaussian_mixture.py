@@ -29,7 +29,7 @@ VARIANCE_FLOOR = 1e-3
 """Added to every variance, as a fraction of the mean variance of the samples: keeps a component from shrinking to one
 point, where its likelihood would be infinite."""
 MAX_ITERATIONS = 200
-"""Maximum number of EM rounds, in case that `EM_TOLERANCE` does not end them."""
+"""Maximum number of EM rounds, in case `EM_TOLERANCE` does not end them."""
 EM_TOLERANCE = 1e-3
 """EM ends when the mean log-likelihood rises by less than this in one round."""
 SEEDS = range(6)

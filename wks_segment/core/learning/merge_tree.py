@@ -1,7 +1,7 @@
-"""Segments as groups of mixture components, joined across long borders that no crease marks.
+"""Segments as groups of mixture components, merged across long borders that no crease marks.
 
 A mixture with as many components as segments cuts where the values of the signature happen to form clusters. A mixture
-with more components has the borders that a person would draw among its own. Its components are joined pair by pair,
+with more components has the borders that a person would draw among its own. Its components are merged pair by pair,
 across the border that is longest for the area of the smaller side; a border counts little along creases and where the
 thickness changes. Few short borders remain, which move little from pose to pose. After Hennig, "Methods for merging
 Gaussian mixture components" (2010), with the geometry of the surface instead of the overlap of densities.
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import coo_matrix
 
-from ..geometry.agglomeration import gains_of_joining, join_in_table
+from ..geometry.agglomeration import gains_of_merging, merge_in_table
 from ..geometry.creases import border_weights
 from ..geometry.normalized_cuts import human_like_parts
 from ..mesh.adjacency import FaceAdjacency, FaceGraph, connected_regions, merge_small_regions
@@ -25,7 +25,7 @@ from ..progress import Progress
 from .parameters import NSegments
 
 MIN_GROUP_SHARE = 0.01
-"""Groups with less than this share of the area are joined first: otherwise each would use up a segment."""
+"""Groups with less than this share of the area are merged first: otherwise each would use up a segment."""
 MIN_BORDER_REGION = 0.002
 """Connected regions with less than this share of the area are ignored when borders are measured: they are noise."""
 CHANGE_LENGTH = 20.0
@@ -137,13 +137,13 @@ class Contacts:
 
 
 @dataclass(frozen=True)
-class Grouping:
-    """Order in which K components are joined to groups: a binary tree, with quality measures at each level.
+class MergeTree:
+    """Order in which K components are merged into groups: a binary tree, with quality measures at each level.
 
     Attributes
     ----------
     pairs : (K − 1, 2) array of int
-        The two groups that each step joins, the larger one first. The joined group keeps the name of the larger one; a
+        The two groups that each step merges, the larger one first. The merged group keeps the name of the larger one; a
         group of one component has the name of this component.
     certainties : (K,) array
         Certainty with 1, 2, … K groups: Σ over faces of area times the squares of the posteriors, which is low where
@@ -160,10 +160,10 @@ class Grouping:
     cuts: FloatArray
 
     @classmethod
-    def of(cls, contacts: Contacts, scattered: BoolArray | None = None) -> Grouping:
-        """Join the components of a mixture, best pair first, until one group is left.
+    def of(cls, contacts: Contacts, scattered: BoolArray | None = None) -> MergeTree:
+        """Merge the components of a mixture, best pair first, until one group is left.
 
-        Small components, and those marked in (K,) `scattered`, are joined before all others.
+        Small components, and those marked in (K,) `scattered`, are merged before all others.
         """
         borders, overlaps = contacts.borders.copy(), contacts.overlaps.copy()
         areas = np.maximum(contacts.areas, LEAST_AREA)
@@ -178,7 +178,7 @@ class Grouping:
             by_chance[count - 1 - step] = np.square(overlaps.sum(axis=1)).sum()
             np.fill_diagonal(borders, 0)
             cuts[count - 1 - step] = min(np.mean((borders.sum(axis=1) / areas)[alive]), 1 / LEAST_AREA)
-            gain = gains_of_joining(borders, borders.sum(axis=1), areas)
+            gain = gains_of_merging(borders, borders.sum(axis=1), areas)
             touch = borders > 0
             small = (np.minimum(areas[:, None], areas) < MIN_GROUP_SHARE) | scattered[:, None] | scattered
             # Small groups come before large ones, then groups that touch before others; each rule outweighs the rest.
@@ -189,7 +189,7 @@ class Grouping:
             pairs[step] = name[larger], name[smaller]
             name[i] = name[larger]
             for table in (borders, overlaps):
-                join_in_table(table, i, j)
+                merge_in_table(table, i, j)
             areas[i] += areas[j]
             scattered[i] &= scattered[j]
             scattered[j] = alive[j] = False
@@ -198,15 +198,15 @@ class Grouping:
     def groups(self, n_groups: int) -> IntArray:
         """(K,) group of each component when `n_groups` are left.
 
-        Groups are numbered in the reverse order of the joins: one group more splits off the one with the last number
+        Groups are numbered in the reverse order of the merges: one group more splits off the one with the last number
         and leaves the others as they are, so that names and colors stay where they were.
         """
-        joins = len(self.certainties) - n_groups
+        merges = len(self.certainties) - n_groups
         owner = np.arange(len(self.certainties))
-        for i, j in self.pairs[:joins]:
+        for i, j in self.pairs[:merges]:
             owner[owner == j] = i
         number = np.zeros(len(owner), dtype=np.int64)
-        for count, (_, split_off) in enumerate(self.pairs[joins:][::-1], start=1):
+        for count, (_, split_off) in enumerate(self.pairs[merges:][::-1], start=1):
             number[split_off] = count
         return np.asarray(number[owner])
 

@@ -16,7 +16,7 @@ from ..poses.signature_cache import Cache
 from ..progress import Progress
 from .candidates import Candidate, CandidateSet, candidates_key
 from .gaussian_mixture import CovarianceType, GaussianMixture, TooFewSamplesError, fit_mixtures
-from .merge_tree import Grouping
+from .merge_tree import MergeTree
 from .parameters import NSegments, effective, least_segments
 from .training_samples import TrainingSamples
 
@@ -24,11 +24,11 @@ AUTO_TYPES: tuple[CovarianceType, ...] = ("shared", "diag")
 """Covariance types that `covariance_type="auto"` tries on several poses; on one pose it takes the first."""
 CANDIDATES_PER_TYPE = 4
 """Number of mixtures of each covariance type that are compared."""
-EARNED = 0.8
-"""A covariance type other than the first is chosen if its labels disagree between the poses by less than this fraction
-of the disagreement of the first: more parameters must earn their place."""
-REGROUPING_ROUNDS = 5
-"""Maximum number of times that components are joined again, each time with the components of scattered segments first;
+MUST_FALL_TO = 0.8
+"""The disagreement of labels between poses must fall to less than this fraction of that of the first covariance type
+for another type to be chosen: more parameters must earn their place."""
+MERGING_ROUNDS = 5
+"""Maximum number of times that components are merged again, each time with the components of scattered segments first;
 each round can scatter other segments."""
 LEAST_COMPONENTS, PER_SEGMENT, MOST_MORE = 24, 3, 64
 """The mixture has `PER_SEGMENT` components for each segment, but at least `LEAST_COMPONENTS`, and at most `MOST_MORE`
@@ -41,14 +41,14 @@ MIN_SHARE = 0.005
 
 @dataclass(frozen=True)
 class CandidatePlan:
-    """Which mixtures to fit: with more components than segments, which are joined afterwards.
+    """Which mixtures to fit: with more components than segments, which are merged later.
 
     Attributes
     ----------
     training : TrainingSamples
     n_segments : int or "auto"
-        As for `PoseSegmentation`. With "auto", "tied" and "full" have a few components, else as many as segments: with
-        more, such a mixture would take minutes to fit and overfit each pose.
+        As for `PoseSegmentation`. Mixtures of type "tied" or "full" have one component for each segment (a fixed few
+        if this is "auto"); more would take minutes and overfit.
     covariance_types
         The types to try.
     """
@@ -120,16 +120,16 @@ class CandidatePlan:
         return mixtures
 
 
-def mixture_and_grouping(
+def mixture_and_merge_tree(
     parameters: Mapping[str, Any],
     poses: Sequence[PoseSignature],
     training: TrainingSamples,
     cache: Cache | None,
     progress: Progress,
-) -> tuple[GaussianMixture, Grouping | None]:
-    """The best candidate for the parameters of a model; with the paper's setting one mixture without a grouping."""
+) -> tuple[GaussianMixture, MergeTree | None]:
+    """The best candidate for the parameters of a model; with the paper's setting one mixture without a merge tree."""
     n_segments, covariance_type = parameters["n_segments"], effective(parameters, "covariance_type")
-    fitting, evaluating = progress.part(0.0, FITTING_SHARE, "mixture"), progress.part(FITTING_SHARE, 1.0, "parts")
+    fitting, evaluating = progress.part(0.0, FITTING_SHARE, "mixture"), progress.part(FITTING_SHARE, 1.0, "evaluating")
     if parameters["preset"] == "paper":
         samples, shares = training.standardized, training.shares
         return fit_mixtures(samples, shares, n_segments, covariance_type, parameters["random_state"], 1, fitting)[
@@ -140,69 +140,68 @@ def mixture_and_grouping(
     return best_candidate(candidates, n_segments)
 
 
-def best_candidate(candidates: CandidateSet, n_segments: NSegments) -> tuple[GaussianMixture, Grouping]:
-    """The best mixture for a number of segments, and its grouping.
+def best_candidate(candidates: CandidateSet, n_segments: NSegments) -> tuple[GaussianMixture, MergeTree]:
+    """The best mixture for a number of segments, and its merge tree.
 
     Of several poses of one mesh it is the mixture whose labels agree best between the poses; of several meshes, the
     mixture whose regions are most like reference cuts of each mesh by geometry; of a single pose, the mixture that is
     most certain.
     """
-    several = candidates.candidates
-    groupings = [Grouping.of(candidate.contacts) for candidate in several]
+    several = candidates.members
+    trees = [MergeTree.of(candidate.contacts) for candidate in several]
     if len(candidates.geometries) > 1 and not candidates.one_mesh:
         # Final regions are compared: meshes differ more than poses in which components are scattered.
-        groupings = [
-            _without_scattered(candidates, candidate, grouping, n_segments)
-            for candidate, grouping in zip(several, groupings, strict=True)
+        trees = [
+            _without_scattered(candidates, candidate, tree, n_segments)
+            for candidate, tree in zip(several, trees, strict=True)
         ]
         losses = [
-            _rand_error(candidates, candidate, grouping, n_segments)
-            for candidate, grouping in zip(several, groupings, strict=True)
+            _rand_error(candidates, candidate, tree, n_segments) for candidate, tree in zip(several, trees, strict=True)
         ]
         best = int(np.argmin(losses))
-        return several[best].mixture, groupings[best]
+        return several[best].mixture, trees[best]
     if candidates.one_mesh:
         first_type = several[0].mixture.covariance_type
         losses = [
-            _disagreement(candidate, grouping, n_segments)
-            / (1 if candidate.mixture.covariance_type == first_type else EARNED)
-            for candidate, grouping in zip(several, groupings, strict=True)
+            _disagreement(candidate, tree, n_segments)
+            / (1 if candidate.mixture.covariance_type == first_type else MUST_FALL_TO)
+            for candidate, tree in zip(several, trees, strict=True)
         ]
     else:
-        losses = [-float(grouping.certainties[grouping.number_of(n_segments) - 1]) for grouping in groupings]
+        losses = [-float(tree.certainties[tree.number_of(n_segments) - 1]) for tree in trees]
     best = int(np.argmin(losses))
-    return several[best].mixture, _without_scattered(candidates, several[best], groupings[best], n_segments)
+    return several[best].mixture, _without_scattered(candidates, several[best], trees[best], n_segments)
 
 
-def _rand_error(candidates: CandidateSet, candidate: Candidate, grouping: Grouping, n_segments: NSegments) -> float:
+def _rand_error(candidates: CandidateSet, candidate: Candidate, tree: MergeTree, n_segments: NSegments) -> float:
     """Mean over the poses of the Rand-index error of the regions against the reference cuts."""
-    group = grouping.groups(grouping.number_of_wholes(grouping.number_of(n_segments)))
+    group = tree.groups(tree.number_of_wholes(tree.number_of(n_segments)))
     poses = zip(candidates.geometries, candidate.likeliest, strict=True)
     return float(np.mean([geometry.rand_error(group[components]) for geometry, components in poses]))
 
 
-def _disagreement(candidate: Candidate, grouping: Grouping, n_segments: NSegments) -> float:
+def _disagreement(candidate: Candidate, tree: MergeTree, n_segments: NSegments) -> float:
     """Share of faces and pairs of poses with different labels."""
-    number = grouping.number_of(n_segments)
-    member = np.eye(number)[grouping.groups(number)]
+    number = tree.number_of(n_segments)
+    member = np.eye(number)[tree.groups(number)]
     labels = np.stack([(posteriors @ member).argmax(axis=1) for posteriors in candidate.samples])
     return float((labels[:, None] != labels).mean())
 
 
 def _without_scattered(
-    candidates: CandidateSet, candidate: Candidate, grouping: Grouping, n_segments: NSegments
-) -> Grouping:
-    """Grouping in which no segment consists of small regions everywhere.
+    candidates: CandidateSet, candidate: Candidate, tree: MergeTree, n_segments: NSegments
+) -> MergeTree:
+    """Merge tree in which no segment consists of small regions everywhere.
 
-    Components of such a segment are joined before all others, with what surrounds them, until none is left. In poses of
+    Components of such a segment are merged before all others, with what surrounds them, until none is left. In poses of
     one mesh a segment needs a region of at least `MIN_SHARE` in half of the poses; in several meshes one is enough,
     because a mesh may have a part that the others lack.
     """
     least = len(candidates.geometries) / 2 if candidates.one_mesh else 1
     scattered = np.zeros(len(candidate.contacts.areas), dtype=bool)
-    for _ in range(REGROUPING_ROUNDS):
-        number = grouping.number_of(n_segments)
-        group, n_seen = grouping.groups(number), np.zeros(number)
+    for _ in range(MERGING_ROUNDS):
+        number = tree.number_of(n_segments)
+        group, n_seen = tree.groups(number), np.zeros(number)
         for geometry, components in zip(candidates.geometries, candidate.likeliest, strict=True):
             labels, original = group[components], geometry.surface.original
             region = connected_regions(labels, geometry.adjacency)
@@ -212,5 +211,5 @@ def _without_scattered(
         if lasting.all():
             break
         scattered |= ~lasting[group]
-        grouping = Grouping.of(candidate.contacts, scattered)
-    return grouping
+        tree = MergeTree.of(candidate.contacts, scattered)
+    return tree

@@ -7,7 +7,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from ..mesh.surface import Pieces
+from ..mesh.surface import IslandMode
 from ..message import Message
 from ..spectral.eigenpairs import Accuracy
 from ..spectral.intrinsic_delaunay import Laplacian
@@ -33,7 +33,7 @@ _CHOICES = {
     "covariance_type": ("auto", *get_args(CovarianceType)),
     "accuracy": get_args(Accuracy),
     "scaling": get_args(Scaling),
-    "pieces": get_args(Pieces),
+    "pieces": get_args(IslandMode),
     "laplacian": ("auto", *get_args(Laplacian)),
     "preset": get_args(Preset),
 }

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.spatial import cKDTree
 
-from .triangle_mesh import BoolArray, FloatArray, IntArray, components_of_pairs, edges_of
+from .triangle_mesh import BoolArray, FloatArray, IntArray, connected_groups, edges_of
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def connected_regions(labels: IntArray, adjacency: FaceAdjacency) -> IntArray:
     Regions are numbered 0, 1, … by label, and those of one label by their lowest face.
     """
     pairs = adjacency.pairs
-    region = components_of_pairs(pairs[labels[pairs[:, 0]] == labels[pairs[:, 1]]], len(labels))
+    region = connected_groups(pairs[labels[pairs[:, 0]] == labels[pairs[:, 1]]], len(labels))
     first_face = np.unique(region, return_index=True)[1]
     number = np.empty(len(first_face), dtype=np.int64)
     number[np.lexsort((first_face, labels[first_face]))] = np.arange(len(first_face))
@@ -92,7 +92,7 @@ def merge_small_regions(
 
     The smallest region goes first, to the neighbor with which it shares the longest border. An island that is too small
     as a whole takes the label of the nearest face of a region that is large enough, as an eye takes that of its head,
-    and counts as adjacent to that face afterwards.
+    and counts as adjacent to that face afterward.
 
     Parameters
     ----------

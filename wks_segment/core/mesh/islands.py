@@ -16,7 +16,7 @@ CONTACT_REACH = 0.01
 """Two islands are tied at all vertices whose distance exceeds the shortest distance by no more than this, in units of
 the square root of the area."""
 LEAST_CONTACT_SHARE = 0.1
-"""Least share of the vertices of the newer island that are tied: a single link would be a hinge without width."""
+"""Least share of the vertices of the newer island that are tied: a single tie would be a hinge without width."""
 
 
 def ties_between_islands(faces: IntArray, *poses: FloatArray) -> IntArray:

@@ -13,7 +13,7 @@ from .triangle_mesh import (
     FloatArray,
     IntArray,
     TriangleMesh,
-    components_of_pairs,
+    connected_groups,
     edge_lengths,
     edges_of,
     unique_edges,
@@ -83,16 +83,16 @@ def caps_of_small_holes(mesh: TriangleMesh) -> tuple[FloatArray, IntArray]:
     border = edges[count == 1]
     if not len(border):
         return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
-    loop = components_of_pairs(border, mesh.n_vertices)
+    loop = connected_groups(border, mesh.n_vertices)
     # A loop is simple if each vertex has two border edges. Others branch, and it is not clear what the hole is there.
     n_border_edges = np.bincount(border.ravel(), minlength=mesh.n_vertices)
     simple = np.ones(loop.max() + 1, dtype=bool)
     simple[loop[(n_border_edges > 0) & (n_border_edges != 2)]] = False
     lengths = np.linalg.norm(mesh.vertices[border[:, 0]] - mesh.vertices[border[:, 1]], axis=1)
     perimeter = np.bincount(loop[border[:, 0]], weights=lengths, minlength=len(simple))
-    island_area = np.bincount(mesh.components, weights=mesh.vertex_areas)
+    island_area = np.bincount(mesh.islands, weights=mesh.vertex_areas)
     island_of_loop = np.zeros(len(simple), dtype=np.int64)
-    island_of_loop[loop] = mesh.components
+    island_of_loop[loop] = mesh.islands
     small = simple & (perimeter <= HOLE_PERIMETER * np.sqrt(island_area[island_of_loop])) & (perimeter > 0)
     border = border[small[loop[border[:, 0]]]]
     if not len(border):

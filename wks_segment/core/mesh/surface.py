@@ -24,13 +24,13 @@ from .triangle_mesh import (
     FloatArray,
     IntArray,
     TriangleMesh,
-    components_of_pairs,
+    connected_groups,
     islands_of_vertices,
     repeats_a_vertex,
     unique_edges,
 )
 
-Pieces = Literal["joined", "separate"]
+IslandMode = Literal["joined", "separate"]
 """What happens to the islands of a mesh: each is tied to the nearest one, or has a spectrum of its own."""
 
 WELD_TOLERANCE = 1e-6
@@ -60,7 +60,7 @@ class Surface:
         The mesh as it was given.
     mesh : TriangleMesh
         The copy: seams welded, every vertex in a face, no spikes, small holes closed, edges short enough, islands
-        linked.
+        tied.
     vertex_of : (n,) int array
         The vertex of `mesh` that stands for each vertex of `original`: for a vertex without a face or of an island that
         is left out, the nearest one.
@@ -77,9 +77,9 @@ class Surface:
     welded_faces: IntArray
 
     @property
-    def n_components(self) -> int:
-        """Number of islands of `mesh` that are not linked, each with a zero mode of its own."""
-        return int(self.mesh.components.max()) + 1
+    def n_islands(self) -> int:
+        """Number of islands of `mesh`, each with a zero mode of its own; islands that are tied count as one."""
+        return int(self.mesh.islands.max()) + 1
 
     def to_vertices(self, values: FloatArray) -> FloatArray:
         """(n, …) values at the original vertices, from (n', …) values at the vertices of the surface."""
@@ -117,7 +117,7 @@ class Connection:
     ties: IntArray
 
 
-def connect(*poses: TriangleMesh, rest: TriangleMesh | None = None, pieces: Pieces = "joined") -> Connection:
+def connect(*poses: TriangleMesh, rest: TriangleMesh | None = None, pieces: IslandMode = "joined") -> Connection:
     """Decide what the surface of all poses of one mesh is: which vertices are welded, which islands are kept and tied.
 
     Parameters
@@ -148,7 +148,9 @@ def connect(*poses: TriangleMesh, rest: TriangleMesh | None = None, pieces: Piec
     return Connection(welded, kept, ties)
 
 
-def connect_alike(meshes: Sequence[TriangleMesh], names: Sequence[str], pieces: Pieces = "joined") -> list[Connection]:
+def connect_alike(
+    meshes: Sequence[TriangleMesh], names: Sequence[str], pieces: IslandMode = "joined"
+) -> list[Connection]:
     """`connect` for several meshes; those with the same faces are poses of one mesh. Errors begin with a name."""
     connections: list[Connection] = []
     firsts = [next(j for j, other in enumerate(meshes) if np.array_equal(mesh.faces, other.faces)) for mesh in meshes]
@@ -162,7 +164,7 @@ def connect_alike(meshes: Sequence[TriangleMesh], names: Sequence[str], pieces: 
 
 
 def prepare_surface(
-    mesh: TriangleMesh, min_vertices: int = 0, connection: Connection | None = None, pieces: Pieces = "joined"
+    mesh: TriangleMesh, min_vertices: int = 0, connection: Connection | None = None, pieces: IslandMode = "joined"
 ) -> Surface:
     """Weld a mesh along its seams, repair it, refine it to at least `min_vertices` vertices, and tie its islands.
 
@@ -208,13 +210,13 @@ def prepare_surface(
         vertices, faces, parent = split_long_edges(vertices, faces, longest, most_vertices)
         face_of = face_of[parent]
     # Caps and refinement append vertices, so the numbers in the ties stay valid.
-    links = compact[connection.ties]
-    if len(vertices) > surface.n_vertices or len(links):
-        surface = TriangleMesh(vertices, faces, links)
+    ties = compact[connection.ties]
+    if len(vertices) > surface.n_vertices or len(ties):
+        surface = TriangleMesh(vertices, faces, ties)
     return Surface(mesh, surface, vertex_of, face_of, welded_faces)
 
 
-def _in_large_islands(mesh: TriangleMesh, faces: IntArray, pieces: Pieces) -> BoolArray:
+def _in_large_islands(mesh: TriangleMesh, faces: IntArray, pieces: IslandMode) -> BoolArray:
     """(m',) whether each face belongs to an island that is large enough for the surface."""
     island = islands_of_vertices(faces, mesh.n_vertices)[faces[:, 0]]
     if (island == island[0]).all():
@@ -264,4 +266,4 @@ def _same_position(mesh: TriangleMesh) -> IntArray:
         pairs.append(np.stack([border, border[first[same.ravel()]]], axis=1))
         near = cKDTree(positions).query_pairs(tolerance, output_type="ndarray")
         pairs.append(border[first[near]])
-    return components_of_pairs(np.concatenate(pairs), mesh.n_vertices)
+    return connected_groups(np.concatenate(pairs), mesh.n_vertices)

@@ -131,8 +131,8 @@ class TriangleMesh:
         return np.bincount(self.faces.ravel(), weights=thirds, minlength=self.n_vertices).astype(np.float64)
 
     @cached_property
-    def components(self) -> IntArray:
-        """(n,) island of each vertex, numbered 0, 1, …; links tie islands into one, a vertex without face is one."""
+    def islands(self) -> IntArray:
+        """(n,) island of each vertex, numbered 0, 1, …; tied islands count as one, a vertex without face is one."""
         return islands_of_vertices(self.faces, self.n_vertices, self.links)
 
     def __repr__(self) -> str:
@@ -213,17 +213,17 @@ def _checked_lengths(lengths: ArrayLike, n_faces: int) -> FloatArray:
     return array
 
 
-def components_of_pairs(pairs: IntArray, count: int) -> IntArray:
-    """(count,) connected component of each node of a graph with (p, 2) edges, numbered 0, 1, … by the lowest node."""
+def connected_groups(pairs: IntArray, count: int) -> IntArray:
+    """(count,) connected group of each node of a graph with (p, 2) edges, numbered 0, 1, … by the lowest node."""
     first, second = pairs.T
     graph = coo_matrix((np.ones(len(pairs), dtype=np.int8), (first, second)), shape=(count, count))
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def islands_of_vertices(faces: IntArray, n_vertices: int, links: IntArray | None = None) -> IntArray:
-    """(n,) island of each vertex, numbered 0, 1, …; (l, 2) links tie islands into one."""
+    """(n,) island of each vertex, numbered 0, 1, …; islands that (l, 2) links tie count as one."""
     pairs = [faces[:, [0, 1]], faces[:, [1, 2]], *([] if links is None else [links])]
-    return components_of_pairs(np.concatenate(pairs), n_vertices)
+    return connected_groups(np.concatenate(pairs), n_vertices)
 
 
 def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:

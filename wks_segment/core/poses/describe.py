@@ -10,7 +10,7 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecut
 from functools import partial
 from typing import Literal
 
-from ..mesh.surface import Connection, Pieces, connect, connect_alike, prepare_surface
+from ..mesh.surface import Connection, IslandMode, connect, connect_alike, prepare_surface
 from ..mesh.triangle_mesh import TriangleMesh
 from ..message import Message, message_of
 from ..progress import Progress, ReportFunction, ShareFunction
@@ -39,7 +39,7 @@ class PoseDescriber:
     n_eigenpairs: int
     n_energies: int
     accuracy: Accuracy
-    pieces: Pieces
+    pieces: IslandMode
 
     def _check_parameters(self) -> None:
         """Raise ValueError if a parameter is out of range."""
@@ -89,7 +89,7 @@ class PoseDescriber:
         if known is not None:
             return known
         surface = prepare_surface(mesh, VERTICES_PER_PAIR * self.n_eigenpairs, connection)
-        n_pairs = self.n_eigenpairs + surface.n_components - 1
+        n_pairs = self.n_eigenpairs + surface.n_islands - 1
         mesh, laplacian = better_triangles(surface.mesh, self._laplacian())
         step = Progress.of_share(progress)
         signature = wave_kernel_signature_of(mesh, n_pairs, self.n_energies, self.accuracy, step)
@@ -152,7 +152,7 @@ class PoseDescriber:
         connected = connect_alike(meshes, called, self.pieces) if connections is None else connections
         shared = _SharedProgress(Progress.of(progress), names, len(meshes))
 
-        def describe(i: int) -> PoseSignature:
+        def describe_one(i: int) -> PoseSignature:
             try:
                 return self.describe(meshes[i], connected[i], shared.of_pose(i), cache)
             except (ValueError, SpectrumError, MemoryError) as error:
@@ -162,7 +162,7 @@ class PoseDescriber:
                 shared.finish(i)
 
         with ThreadPoolExecutor(workers or self._workers(meshes)) as pool:
-            futures = [pool.submit(describe, i) for i in range(len(meshes))]
+            futures = [pool.submit(describe_one, i) for i in range(len(meshes))]
             try:
                 waiting = set(futures)
                 while waiting:
@@ -261,7 +261,7 @@ class _SharedProgress:
         self._canceled.set()
 
     def report(self) -> None:
-        """ReportFunction the mean over the poses, under the name of the first pose that is not done."""
+        """Report the mean over the poses, under the name of the first pose that is not done."""
         count = len(self._done)
         current = next((i for i, share in enumerate(self._done) if share < 1), count - 1)
         if self._names is None:

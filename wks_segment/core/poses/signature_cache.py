@@ -42,7 +42,7 @@ class SignatureCache(Protocol):
     """A cache of signatures. Several threads may use it at once."""
 
     def get(self, key: str) -> PoseSignature | None:
-        """The signature under a key; None if there is none, or none any more."""
+        """The signature under a key; None if there is none, or no longer one."""
         ...
 
     def put(self, key: str, signature: PoseSignature) -> None:
@@ -54,11 +54,11 @@ class Cache(SignatureCache, Protocol):
     """A cache of arrays of any kind, including signatures."""
 
     def arrays(self, key: str) -> Mapping[str, NDArray[Any]] | None:
-        """The arrays that `keep` stored under a key; None if there are none, or none any more."""
+        """The arrays that `keep` stored under a key; None if there are none, or no longer any."""
         ...
 
     def keep(self, key: str, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Keep arrays under a key; the caller must not change them afterwards."""
+        """Keep arrays under a key; the caller must not change them afterward."""
         ...
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cholesky
 from scipy.sparse import coo_matrix, csr_matrix, diags, identity, vstack
 
-from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh, components_of_pairs
+from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh, connected_groups
 from .dense_eigen import lowest_eigenpairs, solve_lower_triangular
 from .laplacian import stiffness_matrix, unit_area_masses
 
@@ -66,7 +66,7 @@ def cluster_vertices(
         together = (cell[first] == cell[second]) & (
             (number[first] == number[second]) | ~(too_heavy[first] & too_heavy[second])
         )
-        cell = components_of_pairs(np.stack([first[together], second[together]], axis=1), len(positions))
+        cell = connected_groups(np.stack([first[together], second[together]], axis=1), len(positions))
         count = int(cell.max()) + 1
         mass = _sums(masses, cell, count)
         too_heavy = mass[cell] > HEAVIEST_CELL * mean
@@ -161,7 +161,7 @@ class Level:
 
     def zero_modes(self) -> FloatArray:
         """(n, c) M-orthonormal constants in float32, one for each of c islands."""
-        island = components_of_pairs(np.stack(self.edges, axis=1), len(self.areas))
+        island = connected_groups(np.stack(self.edges, axis=1), len(self.areas))
         modes = np.zeros((len(island), int(island.max()) + 1), dtype=np.float32)
         modes[np.arange(len(island)), island] = 1
         return np.asarray(

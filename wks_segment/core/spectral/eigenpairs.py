@@ -219,7 +219,7 @@ class _Problem:
 
     def zero_modes(self) -> FloatArray:
         """(n, c) orthonormal null space of A: a constant function on each of c islands."""
-        island = self.mesh.components
+        island = self.mesh.islands
         modes = np.zeros((len(island), int(island.max()) + 1))
         modes[np.arange(len(island)), island] = self.mass_roots()
         return np.asarray(modes / np.linalg.norm(modes, axis=0))

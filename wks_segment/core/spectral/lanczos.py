@@ -18,7 +18,7 @@ from ..mesh.triangle_mesh import FloatArray
 from ..message import Message
 from ..progress import Progress
 from .coarsening import Level, coarse_eigenpairs
-from .multifrontal import NestedDissectionFactor, SingularError
+from .multifrontal import MultifrontalFactor, SingularError
 from .subspace import block_product, rayleigh_ritz
 
 EXACT_TOLERANCE = 1e-8
@@ -116,23 +116,23 @@ def _missed_pairs(missed: int, count: int) -> Message:
     return Message("{missed} of {count} eigenpairs were not found", missed=missed, count=count)
 
 
-def _factor(operator: csr_matrix, level: Level, shift: float) -> NestedDissectionFactor:
+def _factor(operator: csr_matrix, level: Level, shift: float) -> MultifrontalFactor:
     """Factor of A − shift."""
     shifted = csr_matrix(operator - shift * identity(operator.shape[0], format="csr"))
     try:
-        return NestedDissectionFactor(shifted, level.positions, np.float64)
+        return MultifrontalFactor(shifted, level.positions, np.float64)
     except SingularError as error:
         raise SpectrumError("the eigenpairs cannot be computed: the triangles of the mesh are too thin") from error
 
 
 def _stable_factor(
     operator: csr_matrix, level: Level, shift: float, right: FloatArray
-) -> tuple[float, NestedDissectionFactor]:
+) -> tuple[float, MultifrontalFactor]:
     """A shift near the given one at which solves are accurate, and the factor there.
 
     At an eigenvalue of a part of the surface, a front is nearly singular and the solution loses digits.
     """
-    best: tuple[float, float, NestedDissectionFactor] | None = None
+    best: tuple[float, float, MultifrontalFactor] | None = None
     for nearby in NEARBY_SHIFTS:
         factor = _factor(operator, level, nearby * shift)
         solution = factor.solve(right)
@@ -165,7 +165,7 @@ def _forecast(level: Level, zero_modes: FloatArray, count: int) -> tuple[float, 
 
 
 def _block_lanczos(
-    factor: NestedDissectionFactor,
+    factor: MultifrontalFactor,
     shift: float,
     known: FloatArray,
     start: FloatArray,
@@ -242,7 +242,7 @@ def _lowest_ritz_pairs(
 
 def _polish(
     operator: csr_matrix,
-    factor: NestedDissectionFactor,
+    factor: MultifrontalFactor,
     shift: float,
     zero_modes: FloatArray,
     values: FloatArray,

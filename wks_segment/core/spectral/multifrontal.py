@@ -47,7 +47,7 @@ Dissection = tuple[IntArray, list[_Front]]
 """Order in which unknowns are eliminated, and the fronts in the order of elimination."""
 
 
-class NestedDissectionFactor:
+class MultifrontalFactor:
     """Factorization L D Lᵀ = P A Pᵀ of a sparse symmetric matrix whose unknowns have positions in space.
 
     D has a dense block for each front. The matrix may be indefinite: pivots are chosen within a front only, which is

@@ -22,7 +22,7 @@ from ..mesh.triangle_mesh import FloatArray
 from ..message import Message
 from ..progress import Progress
 from .coarsening import Level, coarse_eigenpairs
-from .multifrontal import NestedDissectionFactor, SingularError
+from .multifrontal import MultifrontalFactor, SingularError
 from .subspace import block_product, rayleigh_ritz
 
 COARSE_CELLS_PER_PAIR, COARSE_CELLS_PER_PAIR_ABOVE = 4.0, 5.0
@@ -161,7 +161,7 @@ class _Correction:
         self.level = level
         self.shift = SHIFT_PER_PAIR * count
         shifted = csr_matrix(level.stiffness + np.float32(self.shift) * level.mass)
-        self.factor = NestedDissectionFactor(shifted, level.positions)
+        self.factor = MultifrontalFactor(shifted, level.positions)
         if self.factor.n_negative:
             raise NotConvergedError("rounding makes the shifted operator indefinite")
 
@@ -199,7 +199,7 @@ class _Correction:
 
 
 def _enlarged(correction: _Correction, vectors: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """As many eigenpairs, the best within the span of the vectors and of their large changes.
+    """The same number of eigenpairs, best within the span of the vectors and their large changes.
 
     This finds functions that are hardly in the coarse space, as those of thin parts of the shape.
     """

@@ -85,7 +85,7 @@ GERMAN_MESSAGES = {
     "pose {number}": "Pose {number}",
     "pose {number} of {count}": "Pose {number} von {count}",
     "mixture": "Mischung",
-    "parts": "Teile",
+    "evaluating": "Auswertung",
     "regions": "Bereiche",
     # Live, and the models that fit.
     "Labels take {seconds:.0f} seconds here, too long to update live": "Labels brauchen hier {seconds:.0f} Sekunden, zu lange für Live",
