@@ -1,4 +1,4 @@
-"""Names, colors and joins that a user gave to the parts of a model. The core only keeps them with the model."""
+"""Names, colors and merges that a user gave to the parts of a model. The core only keeps them with the model."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class PartNotes:
     colors
         sRGB colors of parts, 0 to 1.
     joined
-        For a part that is joined with another one, the number of that other, which is itself joined with none.
+        For a part that is merged into another one, the number of that other, which is itself merged into none.
     """
 
     names: Mapping[int, str] = field(default_factory=dict)

@@ -40,7 +40,7 @@ def test_one_group_more_splits_one_and_keeps_the_numbers_of_the_others():
 
 
 def test_first_join_lowers_the_sum_of_border_by_area_most():
-    # Each join lowers Σ border / area; the first one must lower it most.
+    # Each merge lowers Σ border / area; the first one must lower it most.
     def total(groups):
         table = np.eye(max(groups) + 1)[groups]
         borders = table.T @ ROW @ table
