@@ -9,7 +9,8 @@ def test_a_triangle_soup_is_welded_to_the_closed_surface():
     sphere = icosphere(2)
     surface = prepare_surface(split_at_every_corner(sphere))
     assert surface.mesh.n_vertices == sphere.n_vertices
-    assert surface.n_islands == 1
+    assert surface.n_islands == surface.n_components == 1
+    np.testing.assert_array_equal(surface.mesh.components, surface.mesh.islands)
 
 
 def test_a_seam_is_welded_in_spite_of_rounding():

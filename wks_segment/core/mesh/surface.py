@@ -81,6 +81,11 @@ class Surface:
         """Number of islands of `mesh`, each with a zero mode of its own; islands that are tied count as one."""
         return int(self.mesh.islands.max()) + 1
 
+    @property
+    def n_components(self) -> int:
+        """The former name of `n_islands`, for scripts that use it."""
+        return self.n_islands
+
     def to_vertices(self, values: FloatArray) -> FloatArray:
         """(n, …) values at the original vertices, from (n', …) values at the vertices of the surface."""
         return values[self.vertex_of]

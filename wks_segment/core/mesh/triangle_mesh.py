@@ -135,6 +135,11 @@ class TriangleMesh:
         """(n,) island of each vertex, numbered 0, 1, …; tied islands count as one, a vertex without face is one."""
         return islands_of_vertices(self.faces, self.n_vertices, self.links)
 
+    @property
+    def components(self) -> IntArray:
+        """The former name of `islands`, for scripts that use it."""
+        return self.islands
+
     def __repr__(self) -> str:
         return f"TriangleMesh({self.n_vertices} vertices, {self.n_faces} faces)"
 
