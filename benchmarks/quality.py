@@ -4,7 +4,8 @@ STUDY is one of
 
 consistency  share of the area of unseen poses with the learned label (characters, and MakeHuman's body in motions)
 bodies       the same for bodies of other proportions, made from MakeHuman's
-choices      consistency and human with other learned poses, for MakeHuman's body and the Princeton humans
+choices      the studies `consistency` (MakeHuman's body) and `human` (Princeton humans), with five choices of what is
+             learned
 human        regions compared with segmentations by people (Rand-index error), segments with part names (adjusted Rand
              index)
 seeds        adjusted Rand index between the labels of models that were learned with five seeds
@@ -40,15 +41,15 @@ PRINCETON_CLASSES = {"human": 1, "chair": 101, "octopus": 121, "plier": 201, "fi
 """Number of the first of the twenty shapes of each class in the Princeton benchmark."""
 LEARNED_SHAPES = (0, 4, 8, 12, 16)
 """Indices of the shapes of a class that are learned."""
-MOTIONS_LEARNED = ("walk1 0", "walk1 7", "zombieWalk1 12", "benchmark 0", "tpose 0")
+LEARNED_FRAMES = ("walk1 0", "walk1 7", "zombieWalk1 12", "benchmark 0", "tpose 0")
 FRAMES = 6
 """Number of frames of each motion, including the first and the last."""
 OTHER_BODIES = range(1, 7)
 """Seeds of the other bodies."""
-OTHER_MOTIONS = ("zombieWalk1 24", "walk1 5", "dance1 0")
+OTHER_FRAMES = ("zombieWalk1 24", "walk1 5", "dance1 0")
 """Unseen frames for the other bodies. The first is in the picture."""
 CHOICES = range(5)
-"""Seeds of the choice of learned poses; 0 stands for `LEARNED_SHAPES` and `MOTIONS_LEARNED`."""
+"""Seeds of the choice of learned poses; 0 stands for `LEARNED_SHAPES` and `LEARNED_FRAMES`."""
 SEEDS = range(5)
 Described = dict[str, PoseSignature]
 Frame = dict[str, FloatArray]
@@ -84,7 +85,7 @@ def consistency(options: argparse.Namespace) -> None:
     described = _motions(options.data / "makehuman")
     shares = {}
     for preset in PRESETS:
-        found = agreement.with_learned(_model(options, preset), described, MOTIONS_LEARNED)
+        found = agreement.with_learned(_model(options, preset), described, LEARNED_FRAMES)
         shares[preset] = found.shares
         pictured = [(name, pose, found.labels.get(name, found.known)) for name, pose in described.items()]
         _picture(pictured, options.output / f"makehuman_{preset}.png")
@@ -95,25 +96,25 @@ def bodies(options: argparse.Namespace) -> None:
     """Consistency of labels on other bodies in unseen frames, with a model of MakeHuman's body."""
     folder = options.data / "makehuman"
     body, frames, described = makehuman.load(folder), _frames(folder), _motions(folder)
-    poses, shown = {name: described[name] for name in MOTIONS_LEARNED}, OTHER_MOTIONS[0]
+    poses, shown = {name: described[name] for name in LEARNED_FRAMES}, OTHER_FRAMES[0]
     for seed in OTHER_BODIES:
-        found = _described(other_body(body, seed), {name: frames[name] for name in OTHER_MOTIONS})
+        found = _described(other_body(body, seed), {name: frames[name] for name in OTHER_FRAMES})
         poses |= {f"body {seed}, {name}": pose for name, pose in found.items()}
     shares = {}
     for preset in PRESETS:
-        result = agreement.with_learned(_model(options, preset), poses, MOTIONS_LEARNED)
+        result = agreement.with_learned(_model(options, preset), poses, LEARNED_FRAMES)
         shares[preset] = result.shares
         pictured = [(name, poses[name], labels) for name, labels in result.labels.items() if name.endswith(shown)]
         pictured.insert(0, (f"learned body, {shown}", described[shown], result.known))
         _picture(pictured, options.output / f"bodies_{preset}.png")
-    _print_shares(f"{len(OTHER_BODIES)} other bodies in {len(OTHER_MOTIONS)} poses each", shares)
+    _print_shares(f"{len(OTHER_BODIES)} other bodies in {len(OTHER_FRAMES)} poses each", shares)
 
 
 def choices(options: argparse.Namespace) -> None:
     """Dependence of the results on the choice of learned poses or shapes."""
     body = _motions(options.data / "makehuman")
     truth, humans = _princeton(options.data / "psb", "human")
-    of_body = _choices(list(body), MOTIONS_LEARNED)
+    of_body = _choices(list(body), LEARNED_FRAMES)
     of_humans = _choices(list(humans), [list(humans)[i] for i in LEARNED_SHAPES])
     print(f"| {len(CHOICES)} choices | setting | each | mean | spread | worst pose |\n|{'---|' * 6}")
     pairs = []
@@ -173,7 +174,7 @@ def seeds(options: argparse.Namespace) -> None:
     shapes = list(humans)
     sets = {"Princeton humans": ([humans[shapes[i]] for i in LEARNED_SHAPES], [humans[s] for s in shapes[1::4]])}
     body = _motions(options.data / "makehuman")
-    sets["MakeHuman"] = [body[n] for n in MOTIONS_LEARNED], [d for n, d in body.items() if n not in MOTIONS_LEARNED]
+    sets["MakeHuman"] = [body[n] for n in LEARNED_FRAMES], [d for n, d in body.items() if n not in LEARNED_FRAMES]
     for name, (learned, others) in sets.items():
         for preset in PRESETS:
             labels = []

@@ -2,8 +2,8 @@
 
 The processes are our own and not those of `concurrent.futures`, since a job may crash Blender, hang in an importer or
 fill the memory, and must cost only its own file. A crash in a `ProcessPoolExecutor` breaks the whole pool, a job that
-runs cannot be ended there, and its processes are copies of Python, not Blender programs. With 200 files, one of them
-broken and one that hangs, 198 are done, with two processes 1.98 times as fast as with one (docs/batches.md).
+runs cannot be ended there, and its processes are copies of Python, not Blender programs. Of 200 files, one
+broken and one that hangs, the other 198 are done; two processes are 1.98 times as fast as one (docs/batches.md).
 """
 
 from __future__ import annotations
@@ -86,7 +86,9 @@ class ChildError(Exception):
 
 
 class ChildProcess:
-    """One child process, started by the first call, and again by the next one after it has ended. Not thread-safe.
+    """A child process. The first call starts it; if it has ended since, the next one starts a new one.
+
+    Not thread-safe.
 
     Parameters
     ----------

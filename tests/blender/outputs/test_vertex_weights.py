@@ -12,7 +12,7 @@ from builders import (
 )
 from group_checks import fitted, learned, ours, read, weights_of
 
-from wks_segment.blender.outputs.vertex_weights import own_vertices, soft_weights
+from wks_segment.blender.outputs.vertex_weights import at_own_vertices, soft_weights
 from wks_segment.blender.scene.mesh_arrays import Body
 from wks_segment.core import TriangleMesh
 from wks_segment.core.progress import Progress
@@ -94,7 +94,7 @@ def test_vertex_gets_the_mean_over_its_polygons_by_area():
     split = TriangleMesh(pose.mesh.vertices[pose.mesh.faces.ravel()], np.arange(6).reshape(2, 3))
     apart = replace(pose, mesh=split, vertex_of=np.full(6, -1))
     values = np.repeat(np.where(pose.polygon_of == 0, 0.0, 4.0), 3)[:, None]
-    own, seen = own_vertices(apart, values, Body.of(pose.character))
+    own, seen = at_own_vertices(apart, values, Body.of(pose.character))
     np.testing.assert_allclose(own[:, 0], [3, 3, 0, 4, 0])
     np.testing.assert_array_equal(seen, [True, True, True, True, False])
 

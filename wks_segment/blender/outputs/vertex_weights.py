@@ -47,7 +47,7 @@ def soft_weights(
     sums, times_seen = np.zeros(()), np.zeros(len(body.vertices), dtype=np.int64)
     pairs = list(zip(poses, described, strict=True))
     for (pose, workpiece), _ in progress.each(pairs):
-        posterior, seen = own_vertices(pose, model.predict_soft(workpiece), body)
+        posterior, seen = at_own_vertices(pose, model.predict_soft(workpiece), body)
         sums, times_seen = sums + posterior, times_seen + seen
     weights = sums / np.maximum(times_seen, 1)[:, None]
     unseen = times_seen == 0
@@ -59,7 +59,7 @@ def soft_weights(
 
 
 def weights_of_parts(weights: FloatArray, labels: IntArray, body: Body) -> dict[int, FloatArray]:
-    """(n,) weights of a character's own vertices in each part, which sum over a segment's parts to the segment's.
+    """(n,) weights of a character's own vertices in each part. Over the parts of a segment they sum to its weights.
 
     Parameters
     ----------
@@ -94,8 +94,8 @@ def move_weights(
     return result
 
 
-def own_vertices(pose: Pose, values: FloatArray, body: Body) -> tuple[FloatArray, BoolArray]:
-    """Carry (n', k) values at the vertices of a pose to the (n, k) own ones of its character; and (n,) which are seen.
+def at_own_vertices(pose: Pose, values: FloatArray, body: Body) -> tuple[FloatArray, BoolArray]:
+    """(n, k) values at a character's own vertices, given (n', k) at those of a pose; and (n,) whether the pose has it.
 
     Where modifiers change faces, only polygons are known: a vertex gets the mean over the polygons around it, by area.
     Rows of vertices that are not seen are 0.

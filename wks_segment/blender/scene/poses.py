@@ -49,13 +49,13 @@ class Pose:
         The polygon that each triangle comes from; the polygons of all objects are numbered one object after another.
         −1 for triangles that a modifier made of something else than the character's polygons.
     vertex_of : (n,) int array
-        The character's own vertex of each vertex, numbered in the same way; −1 on objects whose modifiers change faces:
-        there, only `polygon_of` connects the pose with the character.
+        The character's own vertex that each vertex of `mesh` is, numbered like polygons, one object after another; −1
+        on objects whose modifiers change faces: there, only `polygon_of` connects the pose with the character.
     axes : (3, 3) array
         The character's own x, y and z axes in world space, as columns. x points to its left.
     rest : TriangleMesh, optional
-        The same triangles in the rest position of the character's armature, if it has one: there the artist has put
-        islands together. The axes are then those of the rest position.
+        The same triangles in the rest position of the character's armature, if it has one: there
+        islands lie where the artist has placed them. The axes are then those of the rest position.
     """
 
     name: str
@@ -85,7 +85,7 @@ class Pose:
         """Whether the other pose has the same triangles and the same number of vertices."""
         return self.mesh.n_vertices == other.mesh.n_vertices and np.array_equal(self.mesh.faces, other.mesh.faces)
 
-    def cut_as(self, other: Pose) -> Pose:
+    def triangulated_as(self, other: Pose) -> Pose:
         """The pose with the triangles of another one, if these are of the same polygons; else the pose itself.
 
         Blender triangulates a polygon that is not flat differently in different poses.
@@ -106,7 +106,7 @@ class Pose:
 
 def read_objects(context: bpy.types.Context, characters: Sequence[Character]) -> list[Pose]:
     """One pose of each character, as it is now."""
-    return in_one_cut(
+    return in_one_triangulation(
         [with_rest(context, [read_pose(context, character, character.name)])[0] for character in characters]
     )
 
@@ -194,11 +194,11 @@ def own_frames(scene: bpy.types.Scene, character: Character, count: int) -> list
     return np.unique(middles.round().astype(int)).tolist()
 
 
-def in_one_cut(poses: Sequence[Pose]) -> list[Pose]:
-    """The poses, with the same triangles in all poses of the same polygons."""
+def in_one_triangulation(poses: Sequence[Pose]) -> list[Pose]:
+    """The poses; those with the same polygons get the same triangles."""
     result: list[Pose] = []
     for pose in poses:
-        candidates = (pose.cut_as(other) for other in result)
+        candidates = (pose.triangulated_as(other) for other in result)
         same = (cut for cut, other in zip(candidates, result, strict=True) if cut.is_mesh_of(other))
         result.append(next(same, pose))
     return result
@@ -206,7 +206,7 @@ def in_one_cut(poses: Sequence[Pose]) -> list[Pose]:
 
 def with_rest(context: bpy.types.Context, poses: list[Pose]) -> list[Pose]:
     """Poses of one character with its rest position, if it has an armature and the same polygons at rest."""
-    poses = in_one_cut(poses)
+    poses = in_one_triangulation(poses)
     character = poses[0].character
     armatures = dict.fromkeys(obj.data for obj in map(armature_of, character.objects) if obj is not None)
     if not armatures:
@@ -215,7 +215,8 @@ def with_rest(context: bpy.types.Context, poses: list[Pose]) -> list[Pose]:
     try:
         for armature in armatures:
             armature.pose_position = "REST"
-        rest = read_pose(context, character, Message("{name}, rest position", name=character.name)).cut_as(poses[0])
+        rest = read_pose(context, character, Message("{name}, rest position", name=character.name))
+        rest = rest.triangulated_as(poses[0])
     finally:
         for armature, position in before.items():
             armature.pose_position = position

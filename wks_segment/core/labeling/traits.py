@@ -1,7 +1,7 @@
 """Connected regions of a pose, and the traits that tell them apart in any pose and on any meshing.
 
-Signatures are the same on the left and on the right. Two mirrored regions have the same image in signature space, but
-it is passed through in opposite senses: for two functions f and g of the signature, df ∧ dg is the signed area that a
+Signatures are the same on the left and on the right. Two mirrored regions cover the same patch of signature space, but
+with opposite orientation: for two functions f and g of the signature, df ∧ dg is the signed area that a
 face covers in the plane (f, g). Its sum, weighted by a function that is positive near a region and negative near the
 other regions of its segment, tells left from right by the surroundings. After Ren, Poulenard, Wonka and Ovsjanikov,
 "Continuous and orientation-preserving correspondences via functional maps" (2018), whose operator keeps a map from
@@ -28,7 +28,8 @@ PLANES = FIELDS * (FIELDS - 1) // 2
 SURROUNDINGS = 0.3
 """Radius of the surroundings of a region, in units of the square root of the area."""
 LEAST_OVERLAP = 1e-6
-"""Lower bound of the overlap of the heat of two regions, whose logarithm is their distance, and of areas."""
+"""Lower bound of areas, and of the overlap of the heat of two regions: their distance comes from its logarithm, which
+must be finite."""
 MOST_TRAITS = 200
 """Maximum number of regions of a pose that have traits, the largest ones: time and model files grow with its square."""
 
@@ -95,8 +96,8 @@ class Traits:
     signature : (r, FIELDS) array
         Mean of the fields over the region.
     handedness : (r, PLANES) array
-        Σ over faces of h df ∧ dg for all pairs of fields, where h is near 1 at the region and near −1 at the other
-        regions of its segment. It has the opposite sign at the mirrored region.
+        Σ over faces of h df ∧ dg for all pairs of fields, where h is the heat of the region minus the mean heat of the
+        other regions of its segment; 0 if there are none. It has the opposite sign at the mirrored region.
     distance : (r, r) array
         Distance between regions, from the overlap of their heat (Varadhan, 1967), in units of the square root of the
         area.
@@ -148,7 +149,10 @@ def mean_traits(poses: Sequence[Traits]) -> Traits:
 
 
 def mean_of_numbered(first: Traits, poses: Sequence[Traits], numbers: Sequence[IntArray]) -> Traits:
-    """Mean over poses of the traits of each region of the first one, given the numbers of the regions in each pose."""
+    """Traits of each region of `first`, averaged over poses (areas: geometric mean).
+
+    `numbers[i][j]` is the region of `first` that region j of pose i is; regions that `first` lacks have higher numbers.
+    """
     count = len(first.segment)
     area, signature, handedness = np.zeros(count), np.zeros((count, FIELDS)), np.zeros((count, PLANES))
     times_seen, distance = np.zeros(count), np.zeros((count, count))
