@@ -10,9 +10,9 @@ BLENDERS ?= window
 # Tests run side by side, file by file, with one thread each. A process that crashes ends the run.
 JOBS ?= 2
 THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
-PYTEST := pytest -n $(JOBS) --dist loadfile --max-worker-restart 0
+PYTEST := pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 # What depends on the version of Blender or on its NumPy; the rest has been tested on the newest one.
-ON_OLDEST := tests/blender tests/batch/test_batch_command.py tests/core/test_segmentation.py tests/core/test_model_file.py \
+ON_OLDEST := tests/blender tests/core/test_segmentation.py tests/core/test_model_file.py \
 	tests/core/spectral/test_eigenpairs.py --ignore tests/blender/test_installed_zip.py \
 	--ignore tests/blender/cli/test_recipes.py
 # Wheels only, and no byte code before it is needed.

@@ -13,13 +13,42 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 sys.path.insert(0, str(Path(__file__).parent / "core"))
+sys.path.insert(0, str(Path(__file__).parent / "batch"))
+sys.path.insert(0, str(Path(__file__).parent / "few_starts"))
 
+import starts
 import tally
 
 EASY = {"deadline": None, "suppress_health_check": list(HealthCheck), "database": None}
 settings.register_profile("default", max_examples=10, derandomize=True, **EASY)
 settings.register_profile("fuzz", max_examples=1000, print_blob=True, **EASY)
 settings.load_profile("default")
+
+LONGEST = (
+    "blender/cli/test_recipes.py", "blender/cli/test_command_batch.py", "batch/test_dask_cluster.py",
+    "blender/workflow/test_sides.py", "core/test_segmentation.py", "core/poses/test_signature_cache.py",
+)  # fmt: skip
+"""Files that take 15 to 50 seconds of a processor. They come first, the longest one before all, so that at the end no
+process waits for another one (with `--no-loadscope-reorder`: otherwise the files with most tests come first)."""
+
+
+def pytest_collection_modifyitems(items):
+    place = {Path(__file__).parent / name: i for i, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: place.get(item.path, len(LONGEST)))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def few_starts():
+    """Mixtures are learned from few starts, other than with `all_starts`."""
+    with starts.few_starts():
+        yield
+
+
+@pytest.fixture
+def all_starts():
+    """For a test of the quality of what it learns."""
+    with starts.all_starts():
+        yield
 
 
 class LinePerFile:

@@ -47,9 +47,10 @@ def test_labels_follow_settings_and_equal_the_stored_models(walker, settings, se
     np.testing.assert_array_equal(follows, again)
 
 
-def test_labels_follow_sides(session, settings):
+def test_labels_follow_sides(session, settings, monkeypatch):
     from wks_segment.blender.cli import creature
 
+    monkeypatch.setattr(creature, "SUBDIVISIONS", 1)
     obj = creature.build_creature(bpy.context.scene)
     select(obj)
     settings.source, settings.pose_count = "FRAMES", 2

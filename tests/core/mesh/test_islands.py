@@ -44,7 +44,7 @@ def test_the_rest_position_decides_the_ties_if_it_is_given():
 def test_equal_islands_in_different_places_get_different_labels_if_joined():
     # Two balls of the same size, one at the end of a long body, one at its side.
     def figure(bend):
-        body = icosphere(4)
+        body = icosphere(3)
         long = TriangleMesh(body.vertices * (6, 1, 1), body.faces)
         return together(long, ball(6.5, bend, 0, 0.5), ball(0, 0, 1.5, 0.5))
 

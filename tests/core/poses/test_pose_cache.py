@@ -60,7 +60,7 @@ def test_marked_edges_and_min_share_are_not_cached(model, described):
 
 def test_models_do_not_share_cached_results(model, described):
     workpieces = [Workpiece(pose) for pose in described]
-    other = PoseSegmentation(6, **SETTINGS, covariance_type="full").fit(described)
+    other = PoseSegmentation(6, **SETTINGS, covariance_type="spherical").fit(described)
     expected = [outcome(each, described) for each in (model, other)]
     for i in (0, 1, 0):
         for cached, new in zip(outcome((model, other)[i], workpieces), expected[i], strict=True):

@@ -230,12 +230,12 @@ def write_often(folder, limit, seed):
 def test_several_processes_use_one_folder(tmp_path):
     limit = 4 * sum(array.nbytes for array in PoseSegmentation(**SMALL).describe(creature(0.1, 2)).arrays().values())
     context = multiprocessing.get_context("spawn")
-    writers = [context.Process(target=write_often, args=(tmp_path, limit, seed)) for seed in range(3)]
+    writers = [context.Process(target=write_often, args=(tmp_path, limit, seed)) for seed in range(2)]
     for writer in writers:
         writer.start()
     for writer in writers:
         writer.join(120)
-    assert [writer.exitcode for writer in writers] == [0, 0, 0]
+    assert [writer.exitcode for writer in writers] == [0, 0]
     files = list(tmp_path.iterdir())
     assert {path.suffix for path in files} == {".npz"}
     assert sum(path.stat().st_size for path in files) <= limit
@@ -280,7 +280,8 @@ def test_fit_with_another_number_of_segments_reuses_the_candidates(cache):
     assert all(len(of_number) < len(stages[4]) / 2 for number, of_number in stages.items() if number != 4)
 
 
-def test_parameters_of_the_candidates_change_the_key(cache):
+def test_parameters_of_the_candidates_change_the_key():
+    cache = Counting(MemoryCache())
     PoseSegmentation(**SMALL).fit(POSES, cache=cache)
     changes = (
         {"n_segments": 9}, {"covariance_type": "diag"}, {"scaling": "raw"}, {"n_energies": 21},
