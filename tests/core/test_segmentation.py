@@ -137,6 +137,7 @@ def test_coarse_mesh_is_refined_internally_and_labeled_on_its_own_vertices():
     assert fitted.segment_faces(coarse[0]).shape == (coarse[0].n_faces,)
 
 
+@pytest.mark.usefixtures("all_starts")
 def test_islands_get_labels_and_do_not_disturb_the_body():
     def with_eyes(bend):
         eyes = [TriangleMesh(0.1 * icosphere(1).vertices + place, icosphere(1).faces) for place in (2.0, -2.0)]
