@@ -14,8 +14,8 @@ PYTEST := pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --max-worker-
 # What depends on the version of Blender, and a little of the core for its NumPy; the rest has been tested on the newest.
 ON_OLDEST := tests/blender tests/core/test_estimator.py tests/core/test_model_file.py \
 	tests/core/spectral/test_signature.py tests/core/learning/test_gaussian_mixture.py \
-	$(addprefix --ignore tests/blender/,parts workflow/test_sides.py test_installed_zip.py cli/test_recipes.py \
-	cli/test_command_batch.py)
+	$(addprefix --ignore tests/blender/,parts workflow/test_sides.py workflow/test_model_ranking.py \
+	test_installed_zip.py cli/test_recipes.py cli/test_command_batch.py)
 # Wheels only, and no byte code before it is needed.
 PIP := -m pip install --quiet --disable-pip-version-check --only-binary :all: --no-compile
 
