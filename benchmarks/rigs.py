@@ -111,7 +111,7 @@ def load(path: Path, cache: Path = CACHE) -> Rig:
         command = [sys.executable, "-m", "benchmarks.rig_reader", str(path), str(unfinished)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=READING_LIMIT, env={**os.environ})
         if done.returncode:
-            raise RuntimeError(f"{path}: {done.stderr.strip()[-500:]}")
+            raise RuntimeError(done.stderr.strip().splitlines()[-1] if done.stderr.strip() else "Blender has crashed")
         unfinished.replace(target)
     with np.load(target) as arrays:
         return Rig(
@@ -134,7 +134,9 @@ def main() -> int:
     rows, drawings = [], {}
     for path in paths:
         try:
-            row, drawings[path.stem] = measure(load(path, options.output / "cache"), options)
+            row, drawings[f"{path.resolve().parent.name}_{path.stem}"] = measure(
+                load(path, options.output / "cache"), options
+            )
             rows.append(row)
         except (RuntimeError, ValueError, OSError, subprocess.TimeoutExpired) as error:
             print(f"| {path.stem} | failed: {error} |", flush=True)
