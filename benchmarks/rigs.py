@@ -38,8 +38,8 @@ VERSION = 1
 """Of the cached arrays; counted up when what is read changes."""
 LEARNED = (0, 2, 4, 5, 7)
 """Frames that are learned, evenly among the eight as `wks_segment demo` chooses them; the others are unseen."""
-READING_LIMIT = 300
-"""Seconds for one file: bpy may hang."""
+READING_LIMIT = 600
+"""Seconds for one file, which takes twenty at most on a free machine: bpy may hang."""
 MEASURES = {
     "bones whole": ".3f", "segments pure": ".3f", "border at joints": ".3f", "unseen": ".3f", "left/right": ".3f",
     "turning": ".1f",
