@@ -6,16 +6,17 @@ consistency  share of the area of unseen poses with the learned label (character
 bodies       the same for bodies of other proportions, made from MakeHuman's
 choices      the studies `consistency` (MakeHuman's body) and `human` (Princeton humans), with five choices of what is
              learned
-human        regions compared with segmentations by people (Rand-index error), segments with part names (adjusted Rand
-             index)
+human        regions of nine classes compared with segmentations by people (Rand-index error), segments with part names
+             (adjusted Rand index), with three choices of what is learned
+poses        share of the area of unseen poses with the learned label, under strong deformation
 seeds        adjusted Rand index between the labels of models that were learned with five seeds
 retrieval    share of shapes for which `rank` finds the right class: Princeton classes and characters
 remesh       share of the area that keeps its label when a mesh is resampled to half and to twice its faces
 robustness   the same for damaged meshes (as `benchmarks.robustness`)
 
-DATA is a folder with `characters` (files that Blender imports), `makehuman` (its `3dobjs`, `rigs` and motions) and
-`psb` (the Princeton benchmark as .npz files with its numbers). Prints Markdown tables for the default and the paper's
-preset, and writes pictures.
+DATA is a folder with `characters` (files that Blender imports), `makehuman` (its `3dobjs`, `rigs` and motions), `psb`
+(the Princeton benchmark as .npz files with its numbers) and `poses` (shapes in many poses as .npz files). Prints
+Markdown tables for the default and the paper's preset, and writes pictures.
 """
 
 from __future__ import annotations
@@ -25,22 +26,18 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
-from benchmarks import agreement, characters, makehuman, perturbations, retrieval, robustness
+from benchmarks import agreement, characters, deformations, makehuman, perturbations, princeton, retrieval, robustness
 from benchmarks.bodies import other_body
+from benchmarks.pictures import picture
 from benchmarks.speed import table_row
-from wks_segment.core import PoseSegmentation, PoseSignature, TriangleMesh, connect
+from wks_segment.core import PoseSegmentation, PoseSignature, connect
 from wks_segment.core.mesh.triangle_mesh import FloatArray, IntArray
 
 PRESETS = ("default", "paper")
-PRINCETON_CLASSES = {"human": 1, "chair": 101, "octopus": 121, "plier": 201, "fish": 221}
-"""Number of the first of the twenty shapes of each class in the Princeton benchmark."""
-LEARNED_SHAPES = (0, 4, 8, 12, 16)
-"""Indices of the shapes of a class that are learned."""
 LEARNED_FRAMES = ("walk1 0", "walk1 7", "zombieWalk1 12", "benchmark 0", "tpose 0")
 FRAMES = 6
 """Number of frames of each motion, including the first and the last."""
@@ -49,7 +46,7 @@ OTHER_BODIES = range(1, 7)
 OTHER_FRAMES = ("zombieWalk1 24", "walk1 5", "dance1 0")
 """Unseen frames for the other bodies. The first is in the picture."""
 CHOICES = range(5)
-"""Seeds of the choice of learned poses; 0 stands for `LEARNED_SHAPES` and `LEARNED_FRAMES`."""
+"""Seeds of the choice of learned poses; 0 stands for `princeton.LEARNED_SHAPES` and `LEARNED_FRAMES`."""
 SEEDS = range(5)
 Described = dict[str, PoseSignature]
 Frame = dict[str, FloatArray]
@@ -63,6 +60,11 @@ def main() -> None:
     parser.add_argument("data", type=Path, metavar="DATA")
     parser.add_argument("--output", type=Path, default=Path("demo/quality"))
     parser.add_argument("--segments", type=int, default=8)
+    parser.add_argument("--presets", nargs="+", choices=PRESETS, default=PRESETS, help="of the studies human and poses")
+    parser.add_argument(
+        "--choices", type=int, default=princeton.N_CHOICES, help="of learned shapes, in the study human"
+    )
+    parser.add_argument("--signatures", type=Path, help="folder to keep signatures in, for further runs")
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
     STUDIES[options.study](options)
@@ -113,9 +115,9 @@ def bodies(options: argparse.Namespace) -> None:
 def choices(options: argparse.Namespace) -> None:
     """Dependence of the results on the choice of learned poses or shapes."""
     body = _motions(options.data / "makehuman")
-    truth, humans = _princeton(options.data / "psb", "human")
-    of_body = _choices(list(body), LEARNED_FRAMES)
-    of_humans = _choices(list(humans), [list(humans)[i] for i in LEARNED_SHAPES])
+    truth, humans = princeton.read(options.data / "psb", "human", options.signatures)
+    of_body = princeton.choices(list(body), LEARNED_FRAMES, len(CHOICES))
+    of_humans = princeton.choices(list(humans), [list(humans)[i] for i in princeton.LEARNED_SHAPES], len(CHOICES))
     print(f"| {len(CHOICES)} choices | setting | each | mean | spread | worst pose |\n|{'---|' * 6}")
     pairs = []
     for preset in PRESETS:
@@ -140,39 +142,22 @@ def choices(options: argparse.Namespace) -> None:
 
 def human(options: argparse.Namespace) -> None:
     """Regions and segments of the Princeton classes compared with segmentations and part names by people."""
-    print("| class | setting | Rand-index error | regions | people against each other | their parts | part names |")
-    print("|" + "---|" * 7)
-    errors: dict[str, list[float]] = {preset: [] for preset in PRESETS}
-    for name in PRINCETON_CLASSES:
-        truth, described = _princeton(options.data / "psb", name)
-        shapes = list(described)
-        people = [agreement.of_people(t["human_segmentations"]) for t in truth.values()]
-        parts = [len(np.unique(one)) for t in truth.values() for one in t["human_segmentations"]]
-        for preset in PRESETS:
-            model, learned = _model(options, preset), [shapes[i] for i in LEARNED_SHAPES]
-            found = agreement.with_people(model, described, learned, truth)
-            n_regions = [len(np.unique(region)) for region in found.regions.values()]
-            errors[preset].append(float(np.mean(found.errors)))
-            print(
-                table_row([
-                    name, preset, f"{np.mean(found.errors):.3f}", f"{np.mean(n_regions):.1f}", f"{np.mean(people):.3f}",
-                    f"{np.mean(parts):.1f}", f"{np.mean(found.named):.3f}" if found.named else "",
-                ]),
-                flush=True,
-            )  # fmt: skip
-            regions = found.regions | {shape: model.segment_regions(described[shape]) for shape in learned}
-            pictured = [(shape, described[shape], regions[shape]) for shape in shapes]
-            _picture(pictured, options.output / f"{name}_{preset}.png")
-    for preset in PRESETS:
-        print(table_row(["**mean**", preset, f"**{np.mean(errors[preset]):.3f}**", "", "", "", ""]))
+    princeton.table(options, lambda preset: _model(options, preset), options.presets)
+
+
+def poses(options: argparse.Namespace) -> None:
+    """Consistency of labels in unseen poses of strongly deformed shapes."""
+    deformations.table(options, lambda preset: _model(options, preset), options.presets)
 
 
 def seeds(options: argparse.Namespace) -> None:
     """Agreement of models that differ only in their seed."""
     print("| learned from | setting | mean of all pairs | lowest |\n|---|---|---|---|")
-    _, humans = _princeton(options.data / "psb", "human")
+    _, humans = princeton.read(options.data / "psb", "human", options.signatures)
     shapes = list(humans)
-    sets = {"Princeton humans": ([humans[shapes[i]] for i in LEARNED_SHAPES], [humans[s] for s in shapes[1::4]])}
+    sets = {
+        "Princeton humans": ([humans[shapes[i]] for i in princeton.LEARNED_SHAPES], [humans[s] for s in shapes[1::4]])
+    }
     body = _motions(options.data / "makehuman")
     sets["MakeHuman"] = [body[n] for n in LEARNED_FRAMES], [d for n, d in body.items() if n not in LEARNED_FRAMES]
     for name, (learned, others) in sets.items():
@@ -188,9 +173,12 @@ def seeds(options: argparse.Namespace) -> None:
 
 def which_class(options: argparse.Namespace) -> None:
     """Retrieval (section 5 of the paper) on Princeton classes and characters; exit code 1 below the lower limits."""
-    shapes = {name: list(_princeton(options.data / "psb", name)[1].values()) for name in PRINCETON_CLASSES}
+    shapes = {
+        name: list(princeton.read(options.data / "psb", name, options.signatures)[1].values())
+        for name in princeton.NAMED_CLASSES
+    }
     rates: dict[str, float] = {}
-    chosen = _choices([str(i) for i in range(20)], [str(i) for i in LEARNED_SHAPES])
+    chosen = princeton.choices(list(map(str, range(20))), list(map(str, princeton.LEARNED_SHAPES)), len(CHOICES))
     for choice in chosen:
         found = retrieval.retrieved(lambda: _model(options, "default"), shapes, [int(i) for i in choice])
         retrieval.report(f"learned {' '.join(choice)}", found)
@@ -199,7 +187,7 @@ def which_class(options: argparse.Namespace) -> None:
         rates["Princeton" if not rates else " ".join(choice)] = found.rate
     each = list(rates.values())
     print(f"\nfive choices: mean {np.mean(each):.1%}, spread {np.std(each, ddof=1):.1%}, worst {min(each):.1%}")
-    retrieval.report("paper", retrieval.retrieved(lambda: _model(options, "paper"), shapes, LEARNED_SHAPES))
+    retrieval.report("paper", retrieval.retrieved(lambda: _model(options, "paper"), shapes, princeton.LEARNED_SHAPES))
     found = retrieval.of_characters(options.data / "characters", options.output)
     retrieval.report("characters", found)
     rates["characters"] = found.rate
@@ -233,22 +221,13 @@ def damage(options: argparse.Namespace) -> None:
 
 
 STUDIES: dict[str, Callable[[argparse.Namespace], None]] = {
-    "consistency": consistency, "bodies": bodies, "choices": choices, "human": human, "seeds": seeds,
+    "consistency": consistency, "bodies": bodies, "choices": choices, "human": human, "poses": poses, "seeds": seeds,
     "retrieval": which_class, "remesh": remesh, "robustness": damage,
 }  # fmt: skip
 
 
 def _model(options: argparse.Namespace, preset: str) -> PoseSegmentation:
     return PoseSegmentation(options.segments, preset=preset)  # type: ignore[arg-type]
-
-
-def _princeton(folder: Path, name: str) -> tuple[dict[str, Any], Described]:
-    """Arrays and signatures of a class; both presets share the signatures, which have the same eigenpairs."""
-    numbers = [PRINCETON_CLASSES[name] + i for i in range(20)]
-    truth = {f"{name} {number}": np.load(folder / f"{number}.npz") for number in numbers}
-    meshes = [TriangleMesh(arrays["vertices"], arrays["faces"]) for arrays in truth.values()]
-    found = PoseSegmentation().describe_all(meshes, [connect(mesh) for mesh in meshes])
-    return truth, dict(zip(truth, found, strict=True))
 
 
 def _frames(folder: Path) -> dict[str, Frame]:
@@ -272,12 +251,6 @@ def _described(body: makehuman.MakeHuman, frames: Mapping[str, Frame]) -> Descri
     connection = connect(*meshes, rest=body.posed(0))
     found = PoseSegmentation().describe_all(meshes, [connection] * len(meshes))
     return dict(zip(frames, found, strict=True))
-
-
-def _choices(names: Sequence[str], first: Sequence[str]) -> list[Sequence[str]]:
-    """The given first choice, and for each further seed a random choice of as many names."""
-    drawn = (np.random.default_rng(seed).permutation(len(names))[: len(first)] for seed in CHOICES[1:])
-    return [first, *([names[i] for i in sorted(chosen)] for chosen in drawn)]
 
 
 def _predicted(model: PoseSegmentation, described: Iterable[PoseSignature]) -> IntArray:
@@ -307,17 +280,8 @@ def _pairs_row(what: str, preset: str, labels: Sequence[IntArray]) -> str:
 
 
 def _picture(shapes: Sequence[tuple[str, PoseSignature, IntArray]], path: Path) -> None:
-    """Render shapes in the colors of their labels, rotated from y up to Blender's z up."""
-    from wks_segment.blender.render.contact_sheet import Tile, render_poses
-    from wks_segment.blender.scene.poses import Pose
-
-    tiles = []
-    for name, shape, labels in shapes:
-        mesh = shape.surface.original
-        upright = mesh.vertices[:, [0, 2, 1]] * (1, -1, 1) / np.ptp(mesh.vertices, axis=0).max()
-        pose = SimpleNamespace(mesh=TriangleMesh(upright, mesh.faces), polygon_of=np.arange(mesh.n_faces))
-        tiles.append(Tile(cast(Pose, pose), labels, name))
-    render_poses(tiles, path)
+    """Draw described shapes in the colors of their labels."""
+    picture([(name, shape.surface.original, labels) for name, shape, labels in shapes], path)
     print(f"\npicture: {path}\n", flush=True)
 
 
