@@ -20,6 +20,7 @@ LAYERS = {
         {"spectral"},
         {"geometry"},
         {"poses"},
+        {"parts"},
         {"learning"},
         {"labeling"},
         {"user_labels"},

@@ -7,6 +7,8 @@ Cohen-Or 2008).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -137,20 +139,63 @@ def log_thickness(surface: Surface, normals: FloatArray, flows: Flows, progress:
     return flows.over(THICKNESS_LENGTH).smooth(logs)[:, 0].astype(np.float64)
 
 
+@dataclass(frozen=True)
+class BorderShape:
+    """What the shape of one pose says about the borders between its faces.
+
+    Attributes
+    ----------
+    coarse, fine : (p,) arrays
+        `curvature_across` the border of each pair of neighbors, without and with small details.
+    thickness : (m,) array
+        `log_thickness` of each face.
+    """
+
+    coarse: FloatArray
+    fine: FloatArray
+    thickness: FloatArray
+
+
+def border_shape(
+    surface: Surface, adjacency: FaceAdjacency, flows: Flows, progress: Progress | None = None
+) -> BorderShape:
+    """Curvature across the borders between neighbors, and thickness of the faces."""
+    normals = vertex_normals(surface)
+    fine, coarse = (smooth_normals(normals, flows.over(length)) for length in (FINE, COARSE))
+    thickness = surface.to_faces(log_thickness(surface, fine, flows, progress)[:, None])[:, 0]
+    return BorderShape(
+        curvature_across(surface, coarse, adjacency), curvature_across(surface, fine, adjacency), thickness
+    )
+
+
+def weights_of_borders(
+    pairs: IntArray, centers: FloatArray, curvature: FloatArray, thickness: FloatArray
+) -> FloatArray:
+    """(p,) weights of the borders between pairs of neighbors, 1 where the surface is flat and even.
+
+    Parameters
+    ----------
+    pairs : (p, 2) int array
+    centers : (m, 3) array
+        Of the faces, for a surface of area 1.
+    curvature : (p,) array
+        Across each border.
+    thickness : (m,) array
+        Logarithm of the thickness of each face.
+    """
+    a, b = pairs.T
+    distances = np.maximum(np.linalg.norm(centers[a] - centers[b], axis=1), LEAST_DISTANCE)
+    step = np.minimum(np.abs(thickness[a] - thickness[b]) / distances, MOST_STEP)
+    return np.asarray(np.exp(BORDER_CREASE * np.clip(curvature, -MOST_CONCAVE, MOST_CONVEX) - BORDER_STEP * step))
+
+
 def border_weights(
     surface: Surface, adjacency: FaceAdjacency, progress: Progress | None = None
 ) -> tuple[FloatArray, FloatArray]:
     """(p,) weights of the borders between neighbors, 1 where the surface is flat and even, and (p,) fine curvatures."""
-    normals, flows = vertex_normals(surface), Flows(surface.mesh)
-    fine, coarse = (smooth_normals(normals, flows.over(length)) for length in (FINE, COARSE))
-    thickness = surface.to_faces(log_thickness(surface, fine, flows, progress)[:, None])[:, 0]
-    curvature = curvature_across(surface, coarse, adjacency)
+    shape = border_shape(surface, adjacency, Flows(surface.mesh), progress)
     centers = surface.original.unit_face_centers
-    a, b = adjacency.pairs.T
-    distances = np.maximum(np.linalg.norm(centers[a] - centers[b], axis=1), LEAST_DISTANCE)
-    step = np.minimum(np.abs(thickness[a] - thickness[b]) / distances, MOST_STEP)
-    weights = np.exp(BORDER_CREASE * np.clip(curvature, -MOST_CONCAVE, MOST_CONVEX) - BORDER_STEP * step)
-    return weights, curvature_across(surface, fine, adjacency)
+    return weights_of_borders(adjacency.pairs, centers, shape.coarse, shape.thickness), shape.fine
 
 
 def _touching_balls(

@@ -31,6 +31,7 @@ class Kind(Enum):
     FIELDS = auto()
     TRAITS = auto()
     SIDE_FIELD = auto()
+    BORDER_SHAPE = auto()
 
 
 class ResultKey(NamedTuple):

@@ -193,6 +193,7 @@ GERMAN_MESSAGES = {
     "rest has other faces than the first pose: pass the same mesh, in its rest position": "rest hat andere Flächen als die erste Pose: dasselbe Mesh in seiner Ruhepose übergeben",
     "the model is not fitted: call fit, or load a model, first": "das Modell hat nichts gelernt: erst fit aufrufen oder ein Modell laden",
     "a signature was not kept for the next time: {reason}": "eine Signatur wurde nicht für das nächste Mal behalten: {reason}",
+    "creases were not kept for the next time: {reason}": "Falten wurden nicht für das nächste Mal behalten: {reason}",
     "mixtures were not kept for the next time: {reason}": "Mischungen wurden nicht für das nächste Mal behalten: {reason}",
     "min_share must be at least 0 and below 1, not {value!r}": "min_share muss mindestens 0 und kleiner als 1 sein, nicht {value!r}",
     "pose {pose} has {triangles} triangles, but polygons for {given}": "Pose {pose} hat {triangles} Dreiecke, aber Polygone für {given}",

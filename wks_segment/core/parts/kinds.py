@@ -1,0 +1,254 @@
+"""Kinds of parts: which regions are repeats of each other, and the order in which kinds are merged.
+
+A kind is a part of the body, or its repeats: left and right, the fingers, the legs of a spider, the same part of
+another body. Kinds are merged where their regions touch, so a head and a thigh are never one kind although their
+signatures are alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.cluster.hierarchy import fcluster, linkage
+from scipy.spatial.distance import squareform
+
+from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
+from ..progress import Progress
+from .evidence import Evidence
+from .kind_sizes import KindSizes
+from .part_graph import PartGraph
+
+FINEST, WHOLE = 2.0, 0.2
+"""Log-odds down to which regions grow before kinds are found: fine regions on one mesh, where mirrored and repeated
+ones have the same signature; parts as a whole on several meshes, because finer ones differ from body to body."""
+LEAST_REGION = 0.003
+"""Regions below this share of the area are merged with a neighbor in any case."""
+MOST_GROWN = 60
+"""Most regions of a mesh, but at least `REGIONS_PER_SEGMENT` for each segment that is asked for."""
+REGIONS_PER_SEGMENT = 4
+SAME_KIND = 0.7
+"""Regions are repeats if their mean signatures differ by less than this, in standard deviations inside regions and root
+mean square over the axes, with the weighted difference of the logarithms of their areas added."""
+SIZE_WEIGHT, LEAST_SIZE = 0.5, 1e-3
+"""Weight of the logarithm of an area beside signatures, and what is added to the area, so that tiny parts are alike."""
+WITHIN = 1e-3
+"""Added to the variance inside regions, against a division by zero."""
+MIRRORED_SHARE = 0.6
+"""Share of two regions that must be mirror images for them to be one kind."""
+KINDS_OF_BODIES, KINDS_PER_SEGMENT = 12, 1.5
+"""Number of kinds on several meshes: the first, or the second for each segment if that is more."""
+UNTOUCHED = 3.0
+"""Taken from the log-odds of two kinds if no region of the smaller one touches the other, in part if some do not."""
+SMALL_KIND = 0.01
+"""Kinds below this share of the area are merged before all others: an eye goes before a head."""
+FIRST = 100.0
+"""Added to the log-odds of small kinds: more than any."""
+SMALL_FIRST = 1.0
+"""Weight of the logarithm of the smaller kind's area in the order of merges: fingers are merged before limbs."""
+
+
+@dataclass(frozen=True)
+class Kinds:
+    """Kinds of parts on learned meshes, and the order in which they are merged.
+
+    Attributes
+    ----------
+    of_faces
+        For each mesh, (m,) kind of each face: 0, 1, …, k − 1.
+    merges : (k − 1, 2) int array
+        Kinds that each step merges, the larger one first, whose number the result keeps.
+    likeness : (k − 1,) array
+        Log-odds with which each step found its two kinds to be one part.
+    sizes : KindSizes or None
+        Of the kinds, if there are several meshes: on others they help to tell which kind a part is.
+    """
+
+    of_faces: Sequence[IntArray]
+    merges: IntArray
+    likeness: FloatArray
+    sizes: KindSizes | None
+
+
+def find_kinds(
+    meshes: Sequence[Evidence], signatures: Sequence[FloatArray], n_segments: int, progress: Progress
+) -> Kinds:
+    """Cut meshes into parts, find the kinds of these, and merge them one by one.
+
+    Parameters
+    ----------
+    meshes
+    signatures
+        For each mesh, (m, d) values of its faces along uncorrelated axes.
+    n_segments : int
+        Number of segments that there should be at least.
+    progress : Progress
+    """
+    graphs = []
+    for (evidence, signature), _ in progress.each(list(zip(meshes, signatures, strict=True))):
+        graph = PartGraph.of(evidence, signature)
+        grow(graph, FINEST if len(meshes) == 1 else WHOLE, max(MOST_GROWN, REGIONS_PER_SEGMENT * n_segments))
+        graphs.append(graph)
+    if len(meshes) == 1:
+        kinds = [_repeats(meshes[0], signatures[0], graphs[0])]
+    else:
+        kinds = _kinds_of_bodies(graphs, max(KINDS_OF_BODIES, round(KINDS_PER_SEGMENT * n_segments)))
+    logs = [np.log(graph.areas[graph.regions]) for graph in graphs]
+    sizes = KindSizes.of(np.concatenate(logs), np.concatenate(kinds)) if len(meshes) > 1 else None
+    of_faces, merges, likeness = _Merging(graphs, kinds).run()
+    return Kinds(of_faces, merges, likeness, sizes)
+
+
+def grow(graph: PartGraph, least: float, most_regions: int) -> None:
+    """Merge the likeliest pair of regions while its log-odds are above a limit, or regions are too many or small."""
+    while True:
+        first, second = divmod(int(graph.likeness.argmax()), len(graph.alive))
+        if not np.isfinite(graph.likeness[first, second]):
+            return
+        if graph.likeness[first, second] < least and np.count_nonzero(graph.alive) <= most_regions:
+            touching = np.isfinite(graph.likeness.max(axis=1))
+            small = np.flatnonzero(graph.alive & touching & (graph.areas < LEAST_REGION))
+            if not len(small):
+                return
+            first = int(small[graph.areas[small].argmin()])
+            second = int(graph.likeness[first].argmax())
+        graph.merge(first, second)
+
+
+def _repeats(evidence: Evidence, signature: FloatArray, graph: PartGraph) -> IntArray:
+    """(r,) kind of each region of one mesh: regions with the same signature and area, and mirror images, are one."""
+    means, areas = graph.mean_signatures(), graph.areas[graph.regions]
+    if len(areas) == 1:
+        return np.zeros(1, dtype=np.int64)
+    inside = means[np.searchsorted(graph.regions, graph.region_of_faces())]
+    variance = evidence.areas @ (signature - inside) ** 2
+    scaled = means / np.sqrt(variance + WITHIN)
+    distance = np.sqrt(((scaled[:, None] - scaled) ** 2).mean(axis=2))
+    distance += SIZE_WEIGHT * np.abs(np.subtract.outer(np.log(areas), np.log(areas)))
+    distance[_mirrored(evidence, graph)] = 0
+    np.fill_diagonal(distance, 0)
+    tree = linkage(squareform(distance, checks=False), "average")
+    return np.asarray(fcluster(tree, SAME_KIND, "distance") - 1, dtype=np.int64)
+
+
+def _kinds_of_bodies(graphs: Sequence[PartGraph], count: int) -> list[IntArray]:
+    """(r,) kind of each region of each mesh: a fixed number of clusters of mean signature and area (Ward, 1963)."""
+    means = np.concatenate([graph.mean_signatures() for graph in graphs])
+    areas = np.concatenate([graph.areas[graph.regions] for graph in graphs])
+    offset = means - np.average(means, axis=0, weights=areas)
+    unit = np.sqrt(np.average(np.square(offset).sum(axis=1), weights=areas)) or 1.0
+    # Small parts count less, but more than their area: a hand has a hundredth of it.
+    places = np.column_stack([offset / unit, SIZE_WEIGHT * np.log(areas + LEAST_SIZE)]) * areas[:, None] ** 0.25
+    kind = np.zeros(len(areas), dtype=np.int64)
+    if len(areas) > 1:
+        kind = np.asarray(fcluster(linkage(places, "ward"), count, "maxclust") - 1, dtype=np.int64)
+    return np.split(kind, np.cumsum([len(graph.regions) for graph in graphs])[:-1])
+
+
+def _mirrored(evidence: Evidence, graph: PartGraph) -> BoolArray:
+    """(r, r) whether two regions are mirror images of each other."""
+    count = len(graph.regions)
+    if evidence.image is None:
+        return np.zeros((count, count), dtype=bool)
+    region = np.searchsorted(graph.regions, graph.region_of_faces())
+    has = evidence.image >= 0
+    common = np.zeros((count, count))
+    np.add.at(common, (region[has], region[evidence.image[has]]), evidence.areas[has])
+    areas = np.maximum(np.bincount(region, evidence.areas, count), np.finfo(float).tiny)
+    share = np.minimum(common / areas[:, None], common / areas)
+    return np.asarray(np.minimum(share, share.T) > MIRRORED_SHARE)
+
+
+class _Merging:
+    """Kinds that are merged one by one, each with all of its regions that touch."""
+
+    def __init__(self, graphs: Sequence[PartGraph], kinds: Sequence[IntArray]) -> None:
+        self._graphs = graphs
+        self._first = [graph.region_of_faces() for graph in graphs]
+        self._start: list[IntArray] = []
+        self._kind: list[IntArray] = []
+        """For each graph, kind of each number; −1 for numbers of no region."""
+        for graph, kind in zip(graphs, kinds, strict=True):
+            of_number = np.full(len(graph.alive), -1)
+            of_number[graph.regions] = kind
+            self._kind.append(of_number)
+            self._start.append(of_number.copy())
+        self._count = 1 + max(int(kind.max()) for kind in kinds)
+
+    def run(self) -> tuple[list[IntArray], IntArray, FloatArray]:
+        """Merge until one kind is left; see `Kinds`."""
+        of_faces = [start[region] for start, region in zip(self._start, self._first, strict=True)]
+        merges, likeness = [], []
+        left = set(range(self._count))
+        table = np.full((self._count, self._count), -np.inf)
+        areas = self._areas()
+        for i in left:
+            for j in left:
+                if i < j:
+                    table[i, j] = self._likeness(i, j)
+        while len(left) > 1:
+            smaller = np.minimum.outer(areas, areas)
+            rank = table + FIRST * (smaller < SMALL_KIND) - SMALL_FIRST * np.log(np.maximum(smaller, SMALL_KIND))
+            first, second = divmod(int(rank.argmax()), self._count)
+            if not np.isfinite(table[first, second]):
+                first, second = self._untouched(sorted(left), areas)
+            kept, gone = (first, second) if areas[first] >= areas[second] else (second, first)
+            merges.append((kept, gone))
+            likeness.append(max(float(table[min(kept, gone), max(kept, gone)]), -FIRST))
+            self._merge(kept, gone)
+            areas[kept] += areas[gone]
+            areas[gone] = 1.0
+            left.remove(gone)
+            table[gone] = table[:, gone] = -np.inf
+            for other in left - {kept}:
+                table[min(kept, other), max(kept, other)] = self._likeness(kept, other)
+        return of_faces, np.array(merges, dtype=np.int64).reshape(-1, 2), np.array(likeness)
+
+    def _areas(self) -> FloatArray:
+        """Mean share of each kind in the area of a mesh."""
+        total = np.zeros(self._count)
+        for graph, kind in zip(self._graphs, self._kind, strict=True):
+            total += np.bincount(kind[graph.regions], graph.areas[graph.regions], self._count)
+        return total / len(self._graphs)
+
+    def _likeness(self, first: int, second: int) -> float:
+        """Log-odds that two kinds are one part, mean over the regions of the smaller one; −inf if none touch."""
+        area = [0.0, 0.0]
+        best: list[list[tuple[FloatArray, FloatArray]]] = [[], []]
+        for graph, kind in zip(self._graphs, self._kind, strict=True):
+            regions = [np.flatnonzero(graph.alive & (kind == k)) for k in (first, second)]
+            for side in (0, 1):
+                area[side] += graph.areas[regions[side]].sum()
+            block = graph.likeness[np.ix_(*regions)]
+            for side in (0, 1):
+                if block.size:
+                    best[side].append((block.max(axis=1 - side), graph.areas[regions[side]]))
+                elif len(regions[side]) and len(self._graphs) == 1:
+                    best[side].append((np.full(len(regions[side]), -np.inf), graph.areas[regions[side]]))
+        smaller = best[0] if area[0] <= area[1] else best[1]
+        if not smaller:
+            return -np.inf
+        values, weights = (np.concatenate([one[i] for one in smaller]) for i in (0, 1))
+        touch = np.isfinite(values)
+        if not touch.any():
+            return -np.inf
+        cover = float(weights[touch].sum() / weights.sum())
+        return float(np.average(values[touch], weights=weights[touch])) - UNTOUCHED * (1 - cover)
+
+    def _merge(self, kept: int, gone: int) -> None:
+        """Merge all regions of two kinds that touch."""
+        for graph, kind in zip(self._graphs, self._kind, strict=True):
+            while True:
+                ours, theirs = (np.flatnonzero(graph.alive & (kind == k)) for k in (kept, gone))
+                block = graph.likeness[np.ix_(ours, theirs)]
+                if not block.size or not np.isfinite(block.max()):
+                    break
+                i, j = divmod(int(block.argmax()), len(theirs))
+                kind[graph.merge(ours[i], theirs[j])] = kept
+            kind[kind == gone] = kept
+
+    def _untouched(self, left: list[int], areas: FloatArray) -> tuple[int, int]:
+        """The smallest kind and the largest one, if no two kinds touch."""
+        by_area = sorted(left, key=lambda k: areas[k])
+        return by_area[0], by_area[-1]

@@ -1,0 +1,217 @@
+"""Regions of a mesh that grow into parts: the two neighbors that are most likely one part are merged, again and again.
+
+How likely two neighbors are one part is told by seven measures of their common border and of the two sides, and by how
+far they turn apart when the mesh moves. The weights of the measures are those of a logistic regression on cuts that
+people made through 180 shapes of nine classes; each class is cut about as well by weights that were fitted to the
+other eight ("Likeness of regions" in docs/dev/experiments.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry.agglomeration import merge_in_table
+from ..geometry.creases import MOST_CONCAVE, weights_of_borders
+from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
+from .evidence import Evidence
+from .mirror import is_exact
+from .motion import edge_correlations, turns
+from .patches import patches_of
+from .visibility import visible
+
+SMALLER_AREA, LARGER_AREA, CONCAVITY, VISIBILITY, THICKNESS, GAIN, WEIGHT, OFFSET = (
+    -0.2, -0.165, -0.29, 2.417, -1.109, 0.21, -0.315, -2.262,
+)  # fmt: skip
+"""Weights of the logarithms of the two areas, of the mean concavity of the border, of the share of lines of sight that
+are free, of the difference of log thickness, of the logarithms of the gain of normalized cuts and of the mean weight of
+the border; and the constant term."""
+TURN_WEIGHT, TURN_AREA, TURN_POWER = 49.0, 1 / 3, 1.5
+"""A turn by t radians between regions, the smaller of area a, divides the odds that they are one part by
+`(1 + TURN_WEIGHT * a ** TURN_AREA * t / shape) ** TURN_POWER`, with `shape` what creases say, on the same scale. Fitted
+to 22 rigs: the odds fall with the power 1.5 of the turn and 0.5 of the area."""
+VIEWERS = 2
+"""Number of poses in which lines of sight are followed."""
+TINY = 1e-12
+"""Least area, against a division by zero."""
+
+
+@dataclass
+class PartGraph:
+    """Regions of a mesh with what is summed over their borders and faces; merging adds rows and columns.
+
+    Attributes
+    ----------
+    patch : (m,) int array
+        Patch of each face.
+    owner : (n,) int array
+        Region that each patch belongs to now; a region has the number of one of its patches.
+    alive : (n,) bool array
+        Whether each number is one of a region.
+    areas : (n,) array
+    thickness : (n,) array
+        Sum over the faces of area times log thickness.
+    correlations : (n, q, 3, 3) array
+        See `edge_correlations`.
+    signatures : (n, d) array
+        Sum over the faces of area times signature, in any space.
+    lengths, weighted, concavities : (n, n) arrays
+        Sums over the common border: length, weighted length, and length times concavity.
+    sights : (n, n) array
+        Sums over pairs of patches: product of the areas of those that see each other.
+    likeness : (n, n) array
+        Log-odds that two neighbors are one part; −inf for regions that do not touch.
+    """
+
+    patch: IntArray
+    owner: IntArray
+    alive: BoolArray
+    areas: FloatArray
+    thickness: FloatArray
+    correlations: FloatArray
+    signatures: FloatArray
+    lengths: FloatArray
+    weighted: FloatArray
+    concavities: FloatArray
+    sights: FloatArray
+    likeness: FloatArray
+
+    @classmethod
+    def of(cls, evidence: Evidence, signature: FloatArray) -> PartGraph:
+        """Patches of a mesh as the first regions, given (m, d) values of the faces to be summed as signatures."""
+        areas, neighbors = evidence.areas, evidence.neighbors
+        patch = patches_of(evidence.centers, areas, neighbors, evidence.fine_curvature, evidence.image)
+        count = int(patch.max()) + 1
+        weight = weights_of_borders(neighbors.pairs, evidence.centers, evidence.curvature, evidence.thickness)
+        concave = np.clip(-evidence.curvature, 0, MOST_CONCAVE)
+        first, second = patch[neighbors.pairs].T
+        across = first != second
+
+        def table(values: FloatArray) -> FloatArray:
+            sums = np.zeros((count, count))
+            np.add.at(sums, (first[across], second[across]), values[across])
+            return sums + sums.T
+
+        patch_areas = np.maximum(np.bincount(patch, areas, count), TINY)
+        middle = _middle_faces(patch, evidence.centers, areas)
+        viewers = evidence.poses[:VIEWERS]
+        seen = np.mean([visible(pose, middle) for pose in viewers], axis=0)
+        meshes = [pose.surface.original for pose in evidence.poses]
+        graph = cls(
+            patch,
+            np.arange(count),
+            np.ones(count, dtype=bool),
+            patch_areas,
+            np.bincount(patch, areas * evidence.thickness, count).astype(np.float64),
+            edge_correlations(meshes, patch),
+            np.stack([np.bincount(patch, areas * column, count) for column in signature.T], axis=1),
+            table(neighbors.lengths),
+            table(neighbors.lengths * weight),
+            table(neighbors.lengths * concave),
+            seen * np.outer(patch_areas, patch_areas),
+            np.full((count, count), -np.inf),
+        )
+        mirrored = _mirrored_patches(patch, evidence)
+        if mirrored is not None:
+            graph._share_evidence(mirrored)
+        touching = np.nonzero(np.triu(graph.lengths > 0, 1))
+        graph._measure(*touching)
+        return graph
+
+    @property
+    def regions(self) -> IntArray:
+        """Numbers of the regions that are left."""
+        return np.flatnonzero(self.alive)
+
+    def region_of_faces(self) -> IntArray:
+        """(m,) region of each face."""
+        return self.owner[self.patch]
+
+    def mean_signatures(self) -> FloatArray:
+        """(r, d) mean signature of each of `regions`."""
+        regions = self.regions
+        return self.signatures[regions] / self.areas[regions, None]
+
+    def merge(self, first: int, second: int) -> int:
+        """Merge two regions; returns the number of the larger one, which stays."""
+        kept, gone = (first, second) if self.areas[first] >= self.areas[second] else (second, first)
+        for table in (self.lengths, self.weighted, self.concavities):
+            merge_in_table(table, kept, gone)
+            table[kept, kept] = 0
+        merge_in_table(self.sights, kept, gone)
+        for sums in (self.areas, self.thickness, self.correlations, self.signatures):
+            sums[kept] += sums[gone]
+        self.areas[gone] = TINY
+        self.alive[gone] = False
+        self.owner[self.owner == gone] = kept
+        for number in (kept, gone):
+            self.likeness[number] = self.likeness[:, number] = -np.inf
+        around = np.flatnonzero((self.lengths[kept] > 0) & self.alive)
+        self._measure(np.full(len(around), kept), around)
+        return kept
+
+    def _share_evidence(self, mirrored: IntArray) -> None:
+        """Give mirrored regions the same evidence, given the (n,) mirror image of each patch."""
+        for sums in (self.areas, self.thickness, self.signatures):
+            sums += sums[mirrored]
+            sums /= 2
+        for table in (self.lengths, self.weighted, self.concavities, self.sights):
+            table += table[np.ix_(mirrored, mirrored)]
+            table /= 2
+        # Turns are means over pairs of poses: those of the mirror image count as further pairs.
+        self.correlations = np.concatenate([self.correlations, self.correlations[mirrored]], axis=1)
+
+    def _measure(self, first: IntArray, second: IntArray) -> None:
+        """Measure how likely pairs of neighbors are one part."""
+        areas = self.areas
+        low, high = np.minimum(areas[first], areas[second]), np.maximum(areas[first], areas[second])
+        length = np.maximum(self.lengths[first, second], TINY)
+        weighted = self.weighted[first, second]
+        border = self.weighted.sum(axis=1)
+        thickness = self.thickness / areas
+        gain = _gains(weighted, border[first], border[second], areas[first], areas[second])
+        shape = (
+            OFFSET
+            + SMALLER_AREA * np.log(low)
+            + LARGER_AREA * np.log(high)
+            + CONCAVITY * self.concavities[first, second] / length
+            + VISIBILITY * self.sights[first, second] / (low * high)
+            + THICKNESS * np.abs(thickness[first] - thickness[second])
+            + GAIN * np.log(np.maximum(gain, 1e-3))
+            + WEIGHT * np.log(np.maximum(weighted, 1e-6) / length)
+        )
+        turn = turns(self.correlations[first], self.correlations[second], areas[first], areas[second])
+        apart = TURN_WEIGHT * low**TURN_AREA * turn + np.exp(-shape / TURN_POWER)
+        self.likeness[first, second] = self.likeness[second, first] = -TURN_POWER * np.log(apart)
+
+
+def _gains(cut: FloatArray, first: FloatArray, second: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """(k,) decrease of the sum over the regions of border by area when two are merged, given borders and areas.
+
+    The energy of normalized cuts (Golovinskiy and Funkhouser, "Randomized cuts for 3D mesh analysis", 2008).
+    """
+    return np.asarray(first / low + second / high - (first + second - 2 * cut) / (low + high))
+
+
+def _mirrored_patches(patch: IntArray, evidence: Evidence) -> IntArray | None:
+    """(n,) mirror image of each patch; None if the mesh is not its own mirror image."""
+    image = evidence.image
+    if image is None or not is_exact(image, evidence.areas):
+        return None
+    count, own = int(patch.max()) + 1, image >= 0
+    common = np.zeros((count, count))
+    np.add.at(common, (patch[own], patch[image[own]]), evidence.areas[own])
+    mirrored = common.argmax(axis=1)
+    # A patch across the mirror plane may hold what is left of the image of another one: it is its own image.
+    own_number = np.arange(count)
+    return np.where(mirrored[mirrored] == own_number, mirrored, own_number)
+
+
+def _middle_faces(patch: IntArray, centers: FloatArray, areas: FloatArray) -> IntArray:
+    """(n,) face of each patch whose center is nearest to the middle of the patch."""
+    count = int(patch.max()) + 1
+    total = np.maximum(np.bincount(patch, areas, count), TINY)
+    middles = np.stack([np.bincount(patch, areas * axis, count) for axis in centers.T], axis=1) / total[:, None]
+    order = np.lexsort((np.linalg.norm(centers - middles[patch], axis=1), patch))
+    return np.asarray(order[np.searchsorted(patch[order], np.arange(count))])
