@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks import agreement, part_measures, princeton, rigs
 from benchmarks.speed import table_row
 from wks_segment.core import DiskCache, PoseSegmentation, TriangleMesh, connect
-from wks_segment.core.mesh.triangle_mesh import FloatArray, IntArray
+from wks_segment.core.mesh.triangle_mesh import FloatArray, IntArray, repeats_a_vertex
 from wks_segment.core.parts.evidence import Evidence
 from wks_segment.core.parts.kinds import find_kinds, grow
 from wks_segment.core.parts.part_graph import PartGraph
@@ -87,16 +87,19 @@ def of_rig(rig: rigs.Rig, signatures: Path | None) -> list[float]:
     """Measures of a character with `N_SEGMENTS` kinds of parts; prints the row."""
     cache = None if signatures is None else DiskCache(signatures)
     learned, rest = rig.learned, rig.rest_mesh
-    described = PoseSegmentation().describe_all(learned, [connect(*learned, rest=rest)] * len(learned), cache=cache)
+    connection = connect(*learned, rest=rest)
+    described = PoseSegmentation().describe_all(learned, [connection] * len(learned), cache=cache)
     poses = [Workpiece(pose) for pose in described]
     evidence = Evidence.of(poses, rest, Progress(), cache)
     kinds = find_kinds([evidence], [_projected(evidence)], N_SEGMENTS, Progress())
     labels = merged(kinds.of_faces[0], kinds.merges, N_SEGMENTS)
-    borders = TriangleMesh(rig.rest, rig.faces)
+    welded = connection.welded[rig.faces]
+    proper = ~repeats_a_vertex(welded)
+    borders = TriangleMesh(rig.rest, welded[proper])
     found = [
         part_measures.bones_whole(labels, rig.bone, rest.face_areas),
         part_measures.segments_pure(labels, rig.bone, rest.face_areas),
-        part_measures.border_at_joints(borders, labels, rig.bone),
+        part_measures.border_at_joints(borders, labels[proper], rig.bone[proper]),
     ]
     print(table_row([rig.name, str(len(kinds.merges) + 1), *(f"{value:.3f}" for value in found)]), flush=True)
     return found
