@@ -182,6 +182,3 @@ def test_sizes_are_means_and_spreads_of_logarithms():
     sizes = KindSizes.of(np.log([0.1, 0.4, 0.3, 0.2]), np.array([0, 0, 1, 2]))
     np.testing.assert_allclose(np.exp(sizes.mean), [0.2, 0.3, 0.2])
     np.testing.assert_allclose(sizes.spread, [np.log(2), LEAST_SPREAD, LEAST_SPREAD])
-    other = sizes.in_order(np.array([2, 0]))
-    np.testing.assert_allclose(np.exp(other.mean), [0.2, 0.2])
-    np.testing.assert_allclose(other.spread, [LEAST_SPREAD, np.log(2)])

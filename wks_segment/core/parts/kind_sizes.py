@@ -32,7 +32,3 @@ class KindSizes:
         mean = np.array([logs.mean() for logs in of_kinds])
         spread = np.array([max(float(logs.std()), LEAST_SIZE_SPREAD) for logs in of_kinds])
         return cls(mean, spread)
-
-    def in_order(self, kinds: IntArray) -> KindSizes:
-        """Sizes of some of the kinds, in the order given."""
-        return KindSizes(self.mean[kinds], self.spread[kinds])

@@ -221,11 +221,9 @@ class _Merging:
             for side in (0, 1):
                 area[side] += graph.areas[regions[side]].sum()
             block = graph.likeness[np.ix_(*regions)]
-            for side in (0, 1):
-                if block.size:
+            if block.size:  # not every mesh has regions of both kinds
+                for side in (0, 1):
                     best[side].append((block.max(axis=1 - side), graph.areas[regions[side]]))
-                elif len(regions[side]) and len(self._graphs) == 1:
-                    best[side].append((np.full(len(regions[side]), -np.inf), graph.areas[regions[side]]))
         smaller = best[0] if area[0] <= area[1] else best[1]
         if not smaller:
             return -np.inf

@@ -2,8 +2,8 @@
 
 How likely two neighbors are one part is told by seven measures of their common border and of the two sides, and by how
 far they turn apart when the mesh moves. The weights of the measures are those of a logistic regression on cuts that
-people made through 180 shapes of nine classes; each class is cut about as well by weights that were fitted to the
-other eight ("Likeness of regions" in docs/dev/experiments.md).
+people made through ninety shapes of nine classes; each class is cut about as well by weights that were fitted to the
+other eight ("Parts by shape and motion" in docs/dev/experiments.md).
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ SMALLER_AREA, LARGER_AREA, CONCAVITY, VISIBILITY, THICKNESS, GAIN, WEIGHT, OFFSE
 are free, of the difference of log thickness, of the logarithms of the gain of normalized cuts and of the mean weight of
 the border; and the constant term."""
 TURN_WEIGHT, TURN_AREA, TURN_POWER = 49.0, 1 / 3, 1.5
-"""A turn by t radians between regions, the smaller of area a, divides the odds that they are one part by
-`(1 + TURN_WEIGHT * a ** TURN_AREA * t / shape) ** TURN_POWER`, with `shape` what creases say, on the same scale. Fitted
-to 22 rigs: the odds fall with the power 1.5 of the turn and 0.5 of the area."""
+"""With a turn by t radians between two regions, the smaller of area a, and odds o by shape, the odds that they are
+one part are `(TURN_WEIGHT * a ** TURN_AREA * t + o ** (-1 / TURN_POWER)) ** -TURN_POWER`. On eleven rigs the odds fall
+with the power 1.5 of the turn and 0.5 of the area; the weight is the best of four on 22 rigs."""
 VIEWERS = 2
 """Number of poses in which lines of sight are followed."""
 TINY = 1e-12
