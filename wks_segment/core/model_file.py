@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
@@ -15,16 +15,23 @@ import numpy as np
 from .labeling.region_atlas import RegionAtlas
 from .labeling.traits import FIELDS, PLANES
 from .learning.gaussian_mixture import CovarianceType, GaussianMixture
-from .learning.merge_tree import MergeTree
+from .learning.merge_tree import MOST_SEGMENTS, MergeTree
 from .learning.parameters import PARAMETERS, check_parameters, effective
+from .learning.part_mixture import PartMixture
 from .learning.standardizer import LEAST_SPREAD, Standardizer
 from .mesh.triangle_mesh import FloatArray, IntArray
 from .message import Message, message_of
+from .parts.kind_sizes import KindSizes
 from .user_labels import PartNotes
 
 FORMAT = "wks_segment model"
-MODEL_VERSION = 4
+MODEL_VERSION = 5
 """To be raised whenever older programs would misread a new file, or this program an old one."""
+UNIONS_VERSION = 4
+"""Version of models whose segments are unions of components by signature alone. They are read, and label as before."""
+MOST_CUT, BEST_WITHIN = 10.0, 0.06
+"""In such a model, border by area above which groups are fragments, and how far the certainty with an open number of
+segments may be below the best."""
 MOST_OF_PARAMETER = {"n_segments": 1000, "n_eigenpairs": 5000, "n_energies": 1000}
 """Upper bounds of parameters in a file: with more, a mesh would be refined until the memory is full."""
 MOST_NUMBER = 1e6
@@ -51,9 +58,8 @@ class ModelContent:
     ----------
     parameters : dict
         Of the model, by name.
-    mixture : GaussianMixture
+    learned : PartMixture
     standardizer : Standardizer
-    grouping : MergeTree or None
     atlases : (RegionAtlas, RegionAtlas) or None
         Of wholes and of segments.
     usual_scores : (poses,) array
@@ -61,9 +67,8 @@ class ModelContent:
     """
 
     parameters: dict[str, Any]
-    mixture: GaussianMixture
+    learned: PartMixture
     standardizer: Standardizer
-    grouping: MergeTree | None
     atlases: tuple[RegionAtlas, RegionAtlas] | None
     usual_scores: FloatArray
     part_notes: PartNotes
@@ -71,14 +76,20 @@ class ModelContent:
 
 def encode(model: ModelContent) -> str:
     """JSON text of a model."""
-    mixture = model.mixture
+    mixture, grouping, sizes = model.learned.mixture, model.learned.grouping, model.learned.sizes
     arrays: dict[str, FloatArray | IntArray] = {
         "centre": model.standardizer.mean, "spread": model.standardizer.spread, "weights": mixture.weights,
         "means": mixture.means, "covariances": mixture.covariances, "usual_scores": model.usual_scores,
     }  # fmt: skip
-    if model.grouping is not None:
-        arrays["joins"] = model.grouping.pairs
-        arrays |= {name: getattr(model.grouping, name) for name in ("certainties", "by_chance", "cuts")}
+    if grouping is not None:
+        arrays |= {
+            "joins": grouping.pairs,
+            "n_kinds": np.array(grouping.n_kinds),
+            "natural": np.array(grouping.natural),
+        }
+        arrays |= {name: getattr(grouping, name) for name in ("certainties", "by_chance", "likeness")}
+    if sizes is not None:
+        arrays |= {"kind_mean": sizes.mean, "kind_spread": sizes.spread}
     for kind, atlas in zip(REGION_KINDS, model.atlases or (), strict=False):
         arrays |= atlas.arrays(kind)
     content = {
@@ -117,21 +128,37 @@ def decode(text: str) -> ModelContent:
         check_parameters(parameters)
     except (ValueError, TypeError) as error:
         raise ModelFileError(Message("the model has a bad parameter: {reason}", reason=message_of(error))) from error
-    grouping, atlases = None, None
+    grouping, sizes, atlases = None, None, None
     if grouped:
-        joins = arrays["joins"].astype(np.int64)
-        grouping = MergeTree(joins, arrays["certainties"], arrays["by_chance"], arrays["cuts"])
+        grouping = _grouping(arrays)
+        if "kind_mean" in arrays:
+            sizes = KindSizes(arrays["kind_mean"], arrays["kind_spread"])
         wholes, segments = (RegionAtlas.of_arrays(arrays, kind) for kind in REGION_KINDS)
         atlases = wholes, segments
     return ModelContent(
         parameters,
-        GaussianMixture(covariance_type, arrays["weights"], arrays["means"], arrays["covariances"]),
+        PartMixture(
+            GaussianMixture(covariance_type, arrays["weights"], arrays["means"], arrays["covariances"]),
+            grouping,
+            sizes,
+        ),
         Standardizer(effective(parameters, "scaling"), arrays["centre"], arrays["spread"]),
-        grouping,
         atlases,
         arrays["usual_scores"],
         part_notes,
     )
+
+
+def _grouping(arrays: dict[str, FloatArray]) -> MergeTree:
+    """The merge tree in the arrays of a model file."""
+    joins, certainties, by_chance = arrays["joins"].astype(np.int64), arrays["certainties"], arrays["by_chance"]
+    if "cuts" not in arrays:
+        n_kinds, natural = int(arrays["n_kinds"]), int(arrays["natural"])
+        return MergeTree(joins, certainties, by_chance, arrays["likeness"], n_kinds, natural)
+    tree = MergeTree(joins, certainties, by_chance, np.log(arrays["cuts"] / MOST_CUT), len(certainties), 1)
+    curve = tree.curve()[1:MOST_SEGMENTS]
+    natural = 2 + int(np.flatnonzero(curve >= curve.max() - BEST_WITHIN)[-1]) if len(curve) else 1
+    return replace(tree, natural=natural)
 
 
 class _Field(NamedTuple):
@@ -165,8 +192,18 @@ def _fields(
         _Field("joins", (k - 1, 2)),
         _Field("certainties", (k,)),
         _Field("by_chance", (k,)),
-        _Field("cuts", (k,)),
     )
+    if content["version"] == UNIONS_VERSION:
+        yield _Field("cuts", (k,), least=_POSITIVE)
+    else:
+        n_kinds = content.get("n_kinds")
+        yield from (
+            _Field("likeness", (k,)),
+            _Field("n_kinds", (), 1, k, whole=True),
+            _Field("natural", (), 1, k, whole=True),
+        )
+        if "kind_mean" in content:
+            yield from (_Field("kind_mean", (n_kinds,)), _Field("kind_spread", (n_kinds,), least=_POSITIVE))
     for kind in REGION_KINDS:
         r = _length(content, f"{kind}_segment", MOST_REGIONS)
         yield from (
@@ -219,7 +256,7 @@ def _content(text: str) -> dict[str, Any]:
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise ModelFileError("this is not a model of WKS Segment")
     version = content.get("version")
-    if version != MODEL_VERSION:
+    if version not in (UNIONS_VERSION, MODEL_VERSION):
         if isinstance(version, int) and version < MODEL_VERSION:
             template = "the model has version {version!r}, this program reads {known}: learn it again"
         else:

@@ -164,7 +164,7 @@ def ranking_of(scores: FloatArray, usual: Sequence[FloatArray], settings: Sequen
 def _settings(model: PoseSegmentation) -> Hashable:
     """Everything besides the class that scores depend on."""
     described = (*sorted(model.describing().items()), model.pieces, model.preset)
-    return (*described, model.scaling, model.covariance_type, len(model.mixture_.weights))
+    return (*described, model.scaling, model.mixture_.covariance_type)
 
 
 def least_usual(usual: FloatArray) -> float:

@@ -16,11 +16,10 @@ from sklearn.base import BaseEstimator
 from . import model_file
 from .labeling.pose_labeling import PoseLabeling
 from .labeling.region_atlas import RegionAtlas
-from .learning.gaussian_mixture import CovarianceType, GaussianMixture
+from .learning.gaussian_mixture import CovarianceType
 from .learning.likelihood import comparable_score, usual_scores
-from .learning.merge_tree import MergeTree
-from .learning.model_selection import mixture_and_merge_tree
 from .learning.parameters import PARAMETERS, NSegments, Preset, check_parameters, effective
+from .learning.part_mixture import PartMixture, learn_parts
 from .learning.standardizer import Scaling, Standardizer
 from .learning.training_samples import TrainingSamples
 from .mesh.surface import IslandMode
@@ -35,8 +34,8 @@ from .spectral.laplacian import unit_area_masses
 from .threads import one_blas_thread, one_thread
 from .user_labels import PartNotes
 
-DESCRIBED, GROUPED = 0.2, 0.9
-"""Shares of the time of a fit after which the poses are described, and the components of the mixture grouped."""
+DESCRIBED, GROUPED = 0.2, 0.8
+"""Shares of the time of a fit after which the poses are described, and the parts are found and merged."""
 
 
 class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # scikit-learn has no types
@@ -172,16 +171,12 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
         poses = self._all_described(meshes, overall.part(0.0, DESCRIBED), cache)
         overall(DESCRIBED, "mixture")
         training = TrainingSamples.of(poses, parameters)
-        signatures = [workpiece.pose for workpiece in poses]
-        mixture, grouping = mixture_and_merge_tree(
-            parameters, signatures, training, cache, overall.part(DESCRIBED, GROUPED)
-        )
+        learned = learn_parts(parameters, poses, training, rest, cache, overall.part(DESCRIBED, GROUPED))
         atlases = None
-        if grouping is not None:
-            labeler = self._labeler_of(mixture, training.standardizer, grouping)
+        if learned.grouping is not None:
+            labeler = self._labeler_of(learned.mixture, training.standardizer, learned.grouping, learned.sizes)
             atlases = labeler.atlases(poses, rest, overall.part(GROUPED, 1.0, "regions"))
-        scores = usual_scores(mixture, training)
-        self._set_learned(mixture, training.standardizer, grouping, atlases, scores)
+        self._set_learned(learned, training.standardizer, atlases, usual_scores(learned.mixture, training))
         self.part_notes_ = PartNotes()
         overall(1.0, "done")
         return self
@@ -287,8 +282,8 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
             atlases = self.regions_, self.sides_
         return model_file.encode(
             model_file.ModelContent(
-                self._parameters(), mixture, self.standardizer_, self.grouping_, atlases, self.usual_scores_,
-                self.part_notes_,
+                self._parameters(), PartMixture(mixture, self.grouping_, self.kind_sizes_), self.standardizer_, atlases,
+                self.usual_scores_, self.part_notes_,
             )
         )  # fmt: skip
 
@@ -297,9 +292,7 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
         """The model in JSON text; ModelFileError if there is none."""
         content = model_file.decode(text)
         model = cls(**content.parameters)
-        model._set_learned(
-            content.mixture, content.standardizer, content.grouping, content.atlases, content.usual_scores
-        )
+        model._set_learned(content.learned, content.standardizer, content.atlases, content.usual_scores)
         model.part_notes_ = content.part_notes
         return model
 
@@ -315,13 +308,13 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
 
     def _set_learned(
         self,
-        mixture: GaussianMixture,
+        learned: PartMixture,
         standardizer: Standardizer,
-        grouping: MergeTree | None,
         atlases: tuple[RegionAtlas, RegionAtlas] | None,
         scores: FloatArray,
     ) -> None:
-        self.mixture_, self.standardizer_, self.grouping_ = mixture, standardizer, grouping
+        self.mixture_, self.standardizer_ = learned.mixture, standardizer
+        self.grouping_, self.kind_sizes_ = learned.grouping, learned.sizes
         self.regions_, self.sides_ = atlases or (None, None)
         self.usual_scores_ = scores
 

@@ -6,22 +6,22 @@ segments, or another smoothness, computes only the results that depend on it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..geometry.graph_cut import REGION_CREASE, REGION_WIDTH, CutStyle
-from ..learning.candidates import of_one_mesh
 from ..learning.gaussian_mixture import GaussianMixture
 from ..learning.merge_tree import MergeTree
-from ..learning.model_selection import MIN_SHARE
 from ..learning.standardizer import Standardizer
 from ..mesh.adjacency import FaceAdjacency
 from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
+from ..parts.kind_sizes import KindSizes
 from ..poses.pose_cache import Kind, ResultKey, Workpiece
-from ..poses.pose_signature import PoseSignature
+from ..poses.pose_signature import PoseSignature, of_one_mesh
 from ..progress import Progress
+from .own_parts import kinds_of_own_parts
 from .polygons import Cleaning, PolygonMesh
 from .region_atlas import RegionAtlas
 from .sides import side_field, sides_of_regions
@@ -29,6 +29,8 @@ from .traits import FIELDS, Regions, Traits, mean_traits
 
 LABELS_SHARE = 0.7
 """Share of the time of finding regions that their labels take; the rest is recognizing the regions."""
+MIN_SHARE = 0.005
+"""Default share of the area that a connected region must have to keep its label."""
 STRAY_SHARE = 0.15
 """A connected region with less than this share of the area of the largest one of its segment is too small as well. Such
 regions are bands between two other segments where the signature passes through the values of a third, such as a band of
@@ -36,8 +38,8 @@ regions are bands between two other segments where the signature passes through 
 VOTERS = 5
 """Number of poses of a mesh that vote on its sides; more poses hardly change the result."""
 MOST_POSTERIORS = 3_000_000
-"""Maximum number of posteriors of components that are kept with a pose; above it, only posteriors of segments are
-computed, to save memory."""
+"""Maximum number of posteriors of kinds that are kept with a pose; above it, only posteriors of segments are computed, to
+save memory."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,8 @@ class Labeler:
     n_segments : int
     length : float
         Smoothing length in units of the square root of the area; 0: no smoothing.
+    sizes : KindSizes or None
+        Of the kinds of parts, if the model is of several meshes: a mesh is then cut by its own shape.
     """
 
     mixture: GaussianMixture
@@ -62,6 +66,14 @@ class Labeler:
     grouping: MergeTree | None
     n_segments: int
     length: float
+    sizes: KindSizes | None = None
+
+    @property
+    def n_kept(self) -> int:
+        """Number of groups whose posteriors are kept with a pose: the kinds of parts, or the segments if more."""
+        if self.grouping is None:
+            return len(self.mixture.weights)
+        return max(self.grouping.n_kinds, self.n_segments)
 
     @property
     def min_share(self) -> float:
@@ -69,28 +81,25 @@ class Labeler:
         return MIN_SHARE if self.length > 0 else 0.0
 
     def posteriors(self, pose: Workpiece) -> FloatArray:
-        """(n', K) posteriors of the components at the vertices of the surface of a pose."""
-        return self.mixture.posteriors(self.standardizer.transform(pose.signature))
+        """(n', n_segments) posteriors of the segments at the vertices of the surface of a pose."""
+        return self._merged(self._raw(pose, self.n_kept), self.n_segments)
 
-    def merged(self, posteriors: FloatArray, n_groups: int | None = None) -> FloatArray:
-        """(…, n_groups) sums of (…, K) posteriors over the components of each group; of each segment if not given."""
-        if self.grouping is None:
-            return posteriors
-        n_groups = n_groups or self.n_segments
-        return np.asarray(posteriors @ np.eye(n_groups, dtype=posteriors.dtype)[self.grouping.groups(n_groups)])
+    def smoothed(self, pose: Workpiece, n_groups: int) -> FloatArray:
+        """(n', n_groups) smoothed posteriors of groups at the vertices of a pose.
 
-    def smoothed(self, pose: Workpiece, n_groups: int | None) -> FloatArray:
-        """(n', n_groups) smoothed posteriors of groups at the vertices of a pose; of components if None.
-
-        Posteriors of components are kept with the pose: they are the same for every number of groups.
+        Posteriors of kinds are kept with the pose: they are the same for every number of groups.
         """
         if not self._keeps(len(pose.signature)):
-            return self._smooth(pose, self.merged(self.posteriors(pose), n_groups))
-        raw = pose.results.get(ResultKey(Kind.POSTERIORS), (self.mixture,), lambda: self.posteriors(pose))
-        smooth = pose.results.get(
-            ResultKey(Kind.SMOOTH_POSTERIORS), (self.mixture, self.length), lambda: self._smooth(pose, raw)
+            return self._smooth(pose, self._raw(pose, n_groups))
+        raw = pose.results.get(
+            ResultKey(Kind.POSTERIORS), (self.mixture, self.n_kept), lambda: self._raw(pose, self.n_kept)
         )
-        return smooth if n_groups is None else self.merged(smooth, n_groups)
+        smooth = pose.results.get(
+            ResultKey(Kind.SMOOTH_POSTERIORS),
+            (self.mixture, self.n_kept, self.length),
+            lambda: self._smooth(pose, raw),
+        )
+        return self._merged(smooth, n_groups)
 
     def segments(
         self,
@@ -210,17 +219,55 @@ class Labeler:
     ) -> FloatArray:
         """(p, n_groups) smoothed posteriors of polygons, mean over the poses."""
         if not self._keeps(max(mesh.n_polygons, *(len(pose.signature) for pose in poses))):
-            return mesh.mean(poses, lambda pose: self.smoothed(pose, n_groups), progress)
-        of_components = poses[0].results.get(
+            return mesh.mean(poses, self._on_faces(poses, n_groups), progress)
+        of_kinds = poses[0].results.get(
             ResultKey(Kind.MEAN_POSTERIORS, len(poses), of_polygons),
-            (mesh, self.mixture, self.length),
-            lambda: mesh.mean(poses, lambda pose: self.smoothed(pose, None), progress),
+            (mesh, self.mixture, self.n_kept, self.length),
+            lambda: mesh.mean(poses, self._on_faces(poses, self.n_kept), progress),
         )
-        return self.merged(of_components, n_groups)
+        return self._merged(of_kinds, n_groups)
+
+    def _on_faces(self, poses: Sequence[Workpiece], n_groups: int) -> Callable[[Workpiece], FloatArray]:
+        """Function that gives the (m, n_groups) posteriors on the faces of one of the poses of a mesh."""
+        if self.sizes is None or self.length == 0:
+            return lambda pose: pose.surface.to_faces(self.smoothed(pose, n_groups))
+        together = poses if of_one_mesh(_pose_signatures(poses)) else None
+        return lambda pose: self._merged(self._of_own_parts(together or [pose]), n_groups)
+
+    def _of_own_parts(self, poses: Sequence[Workpiece]) -> FloatArray:
+        """(m, n_kept) posteriors of kinds on the faces of a mesh that is cut by its own shape."""
+        assert self.grouping is not None and self.sizes is not None
+        sizes, group = self.sizes, self.grouping.groups(self.grouping.n_kinds)
+
+        def log_likelihoods(pose: Workpiece) -> FloatArray:
+            samples = self.standardizer.transform(pose.signature)
+            return self.mixture.group_log_likelihoods(samples, group, len(sizes.mean))
+
+        inputs = self.mixture, self.grouping, *_pose_signatures(poses)
+        return poses[0].results.get(
+            ResultKey(Kind.OWN_PARTS, len(poses)),
+            inputs,
+            lambda: kinds_of_own_parts(poses, log_likelihoods, sizes, Progress()),
+        )
 
     def _keeps(self, count: int) -> bool:
-        """Whether posteriors of components at this many places are kept."""
-        return count * len(self.mixture.weights) <= MOST_POSTERIORS
+        """Whether posteriors of kinds at this many places are kept."""
+        return count * self.n_kept <= MOST_POSTERIORS
+
+    def _raw(self, pose: Workpiece, n_groups: int) -> FloatArray:
+        """(n', n_groups) posteriors of groups of components at the vertices of a pose."""
+        samples = self.standardizer.transform(pose.signature)
+        if self.grouping is None:
+            return self.mixture.posteriors(samples)
+        return self.mixture.group_posteriors(samples, self.grouping.groups(n_groups), n_groups)
+
+    def _merged(self, posteriors: FloatArray, n_groups: int) -> FloatArray:
+        """(…, n_groups) sums of posteriors of finer groups over those of each group."""
+        fine = posteriors.shape[-1]
+        if self.grouping is None or fine == n_groups:
+            return posteriors
+        owner = self.grouping.group_of_groups(fine, n_groups)
+        return np.asarray(posteriors @ np.eye(n_groups, dtype=posteriors.dtype)[owner])
 
     def _smooth(self, pose: Workpiece, posteriors: FloatArray) -> FloatArray:
         return pose.flows.over(self.length).smooth(posteriors) if self.length > 0 else posteriors

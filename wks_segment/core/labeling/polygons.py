@@ -89,13 +89,13 @@ class PolygonMesh:
         posteriors_on: Callable[[Workpiece], FloatArray],
         progress: Progress,
     ) -> FloatArray:
-        """(p, K) mean over triangles and poses of (n', K) posteriors at the vertices of each pose.
+        """(p, K) mean over triangles and poses of (m, K) posteriors on the faces of each pose.
 
         Progress is reported after each pose.
         """
         total: FloatArray = np.zeros(())
         for i, (pose, in_pose) in enumerate(zip(poses, self._in_poses, strict=True)):
-            total = total + in_pose.mean @ pose.surface.to_faces(posteriors_on(pose))
+            total = total + in_pose.mean @ posteriors_on(pose)
             progress((i + 1) / len(poses))
         return total / np.maximum(self._times_seen, 1)[:, None]
 

@@ -8,13 +8,14 @@ from typing import Any, Literal
 import numpy as np
 from sklearn.exceptions import NotFittedError
 
-from ..learning.candidates import SMOOTHING_LENGTH
 from ..learning.gaussian_mixture import GaussianMixture
 from ..learning.merge_tree import MergeTree
+from ..learning.part_mixture import SMOOTHING_LENGTH
 from ..learning.standardizer import Standardizer
 from ..mesh.adjacency import connected_regions
 from ..mesh.triangle_mesh import FloatArray, IntArray
 from ..message import Message
+from ..parts.kind_sizes import KindSizes
 from ..poses.describe import PoseDescriber
 from ..poses.pose_cache import AnyPose, Workpiece
 from ..progress import Progress, ShareFunction
@@ -30,6 +31,7 @@ class PoseLabeling(PoseDescriber):
     mixture_: GaussianMixture
     standardizer_: Standardizer
     grouping_: MergeTree | None
+    kind_sizes_: KindSizes | None
     regions_: RegionAtlas | None
     sides_: RegionAtlas | None
 
@@ -46,7 +48,7 @@ class PoseLabeling(PoseDescriber):
     def predict_proba(self, mesh: AnyPose) -> FloatArray:
         """(n, n_segments) posterior of each segment at each vertex; rows sum to 1."""
         labeler, pose = self._labeler(), self._described(mesh)
-        return pose.surface.to_vertices(labeler.merged(labeler.posteriors(pose)))
+        return pose.surface.to_vertices(labeler.posteriors(pose))
 
     @one_blas_thread
     def predict_soft(self, mesh: AnyPose) -> FloatArray:
@@ -202,11 +204,17 @@ class PoseLabeling(PoseDescriber):
     def _labeler(self) -> Labeler:
         """Labeler with the learned mixture and the current settings."""
         mixture = self._fitted()
-        return self._labeler_of(mixture, self.standardizer_, self.grouping_)
+        return self._labeler_of(mixture, self.standardizer_, self.grouping_, self.kind_sizes_)
 
-    def _labeler_of(self, mixture: GaussianMixture, standardizer: Standardizer, grouping: MergeTree | None) -> Labeler:
+    def _labeler_of(
+        self,
+        mixture: GaussianMixture,
+        standardizer: Standardizer,
+        grouping: MergeTree | None,
+        sizes: KindSizes | None,
+    ) -> Labeler:
         length = float(self._effective("smoothness") * SMOOTHING_LENGTH)
-        return Labeler(mixture, standardizer, grouping, self._number_of_segments(mixture, grouping), length)
+        return Labeler(mixture, standardizer, grouping, self._number_of_segments(mixture, grouping), length, sizes)
 
     def _number_of_segments(self, mixture: GaussianMixture, grouping: MergeTree | None) -> int:
         return len(mixture.weights) if grouping is None else grouping.number_of(self.n_segments)

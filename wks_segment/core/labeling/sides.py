@@ -12,10 +12,10 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from ..mesh.adjacency import FaceAdjacency, connected_regions
-from ..mesh.surface import Surface
+from ..mesh.surface import Surface, shares_at_vertices
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ..poses.pose_cache import Workpiece
-from .traits import LEAST_OVERLAP, shares_at_vertices
+from .traits import LEAST_OVERLAP
 
 SIMILAR_AREA = 0.5
 """Regions on two sides are a pair if the smaller one has at least this fraction of the area of the larger one: a tail

@@ -14,10 +14,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
 
 from ..mesh.adjacency import FaceAdjacency, connected_regions
-from ..mesh.surface import Surface
+from ..mesh.surface import shares_at_vertices
 from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
 from ..poses.pose_cache import Workpiece
 from ..spectral.laplacian import unit_area_masses
@@ -194,19 +193,6 @@ def deviation_of_numbered(mean: Traits, poses: Sequence[Traits], numbers: Sequen
     # Bessel's correction: the mean is over the same poses.
     correction = len(poses) / (len(poses) - 1)
     return np.asarray(np.sqrt(correction * squares / np.maximum(times_seen[[0, 0, 0, 1]], 1)))
-
-
-def shares_at_vertices(surface: Surface, region: IntArray, count: int) -> FloatArray:
-    """(n', count) share of each region in the area around each vertex of the surface.
-
-    Given the region of each original face, 0 to `count` − 1; -1 for a face without a region.
-    """
-    mesh = surface.mesh
-    inside_any = (surface.face_of >= 0) & (region[surface.face_of] >= 0)
-    areas, faces, owner = mesh.face_areas[inside_any], mesh.faces[inside_any], region[surface.face_of[inside_any]]
-    entries = np.repeat(areas, 3), (faces.ravel(), np.repeat(owner, 3))
-    inside: FloatArray = coo_matrix(entries, shape=(mesh.n_vertices, count)).toarray()
-    return inside / np.maximum(inside.sum(axis=1, keepdims=True), np.finfo(float).tiny)
 
 
 def _signed_areas(pose: Workpiece, fields: FloatArray) -> FloatArray:

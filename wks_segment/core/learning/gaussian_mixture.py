@@ -97,6 +97,22 @@ class GaussianMixture:
         shares = np.exp(logs - logs.max(axis=1, keepdims=True))
         return np.asarray(shares / shares.sum(axis=1, keepdims=True))
 
+    def group_posteriors(self, samples: FloatArray, group: IntArray, n_groups: int) -> FloatArray:
+        """(n, n_groups) sums of the posteriors over the components of each group, given (K,) the group of each.
+
+        In single precision, block by block: posteriors of all components together would take several times the memory.
+        """
+        member = np.eye(n_groups, dtype=np.float32)[group]
+        blocks = [samples[start : start + BLOCK_ROWS] for start in range(0, max(len(samples), 1), BLOCK_ROWS)]
+        return np.concatenate([self.posteriors(block).astype(np.float32) @ member for block in blocks])
+
+    def group_log_likelihoods(self, samples: FloatArray, group: IntArray, n_groups: int) -> FloatArray:
+        """(n, n_groups) log-density of the part of the mixture that each group of components makes, as one of its own."""
+        logs, member = self.log_densities(samples), np.eye(n_groups)[group]
+        highest = logs.max(axis=1, keepdims=True)
+        sums = np.maximum(np.exp(logs - highest) @ member, np.finfo(float).tiny)
+        return np.asarray(np.log(sums) + highest - np.log(self.weights @ member))
+
     def log_likelihoods(self, samples: FloatArray) -> FloatArray:
         """(n,) log-density of the whole mixture at (n, d) samples."""
         return np.asarray(logsumexp(self.log_densities(samples), axis=1))
@@ -230,12 +246,11 @@ def _maximize_likelihood(
 ) -> tuple[GaussianMixture, float]:
     """Mixture by EM from (n, K) responsibilities, and its mean log-likelihood."""
     previous = -np.inf
-    squares = None
     if covariance_type not in ("full", "tied"):
-        # With diagonal covariances both steps need only the squares of the samples, which are computed once. Samples
-        # are standardized, so that sums of squares keep their digits in single precision, which takes half the time.
+        # Samples are standardized, so that sums of squares keep their digits in single precision, which takes half the
+        # time.
         samples = samples.astype(np.float32)
-        squares = samples**2
+    squares = squares_of(samples, covariance_type)
     responsibilities = start.astype(samples.dtype)
     shares = shares.astype(samples.dtype)
     for i in range(MAX_ITERATIONS):
@@ -254,6 +269,11 @@ def _maximize_likelihood(
     return mixture, current
 
 
+def squares_of(samples: FloatArray, covariance_type: CovarianceType) -> FloatArray | None:
+    """(n, d) squares of samples, to be computed once: with diagonal covariances both steps of EM need no more."""
+    return None if covariance_type in ("full", "tied") else samples**2
+
+
 def maximize(
     samples: FloatArray,
     squares: FloatArray | None,
@@ -269,10 +289,13 @@ def maximize(
     weights = masses.sum(axis=0, dtype=np.float64) + 10 * np.finfo(float).tiny ** 0.5
     means = (masses.T @ samples).astype(np.float64) / weights[:, None]
     covariances: FloatArray
-    if squares is None:
+    if covariance_type == "tied":
+        # One product for all components: samples are standardized, so that the difference keeps its digits.
+        covariances = (samples * masses.sum(axis=1)[:, None]).T @ samples - (means * weights[:, None]).T @ means
+        covariances = (covariances + covariances.T) / 2 + floor * np.eye(samples.shape[1])
+    elif squares is None:
         scatter = np.stack([_scatter(samples - mean, mass) for mean, mass in zip(means, masses.T, strict=True)])
-        covariances = scatter.sum(axis=0) if covariance_type == "tied" else scatter / weights[:, None, None]
-        covariances = covariances + floor * np.eye(samples.shape[1])
+        covariances = scatter / weights[:, None, None] + floor * np.eye(samples.shape[1])
     elif covariance_type == "shared":
         # The sum over components comes first: it needs one row of squares instead of one for each component.
         covariances = np.maximum((masses.sum(axis=1) @ squares).astype(np.float64) - weights @ means**2, 0) + floor
@@ -297,9 +320,14 @@ def _log_gaussians(
 ) -> FloatArray:
     """(n, K) log-densities without the weights; `squares` are those of centered samples, None to compute them."""
     n_components, dimension = means.shape
-    if covariance_type in ("full", "tied"):
-        matrices = np.broadcast_to(covariances, (n_components, dimension, dimension))
-        factors = np.linalg.cholesky(matrices)
+    if covariance_type == "tied":
+        # Along axes on which the covariance is the unit matrix, distances are those of one spherical covariance.
+        factor, center = np.linalg.cholesky(covariances), means.mean(axis=0)
+        log_determinant = float(np.log(np.diagonal(factor)).sum())
+        along = [solve_triangular(factor, (x - center).T, lower=True).T for x in (samples, means)]
+        return _log_gaussians(along[0], along[0] ** 2, along[1], np.ones(dimension), "shared") - log_determinant
+    if covariance_type == "full":
+        factors = np.linalg.cholesky(covariances)
         half_log_determinants = np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
         distances = np.stack(
             [

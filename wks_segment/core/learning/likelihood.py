@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..mesh.triangle_mesh import FloatArray, IntArray
-from .gaussian_mixture import GaussianMixture, maximize, variance_floor
+from .gaussian_mixture import GaussianMixture, maximize, squares_of, variance_floor
 from .standardizer import Standardizer
 from .training_samples import TrainingSamples
 
@@ -81,7 +81,7 @@ def left_out_likelihoods(
     (n,) log-likelihoods.
     """
     floor = variance_floor(samples, shares)
-    squares = None if mixture.covariance_type in ("full", "tied") else samples**2
+    squares = squares_of(samples, mixture.covariance_type)
     masses = mixture.posteriors(samples) * shares[:, None]
     likelihoods = np.empty(len(samples))
     for i in np.unique(group):

@@ -33,6 +33,8 @@ class TrainingSamples:
         vertices.
     pose : (n,) int array
         Index of the pose that each sample is from.
+    vertex : (n,) int array
+        Its vertex on the surface of this pose.
     standardizer : Standardizer
         Fitted to the signatures.
     standardized : (n, d) array of float64
@@ -42,6 +44,7 @@ class TrainingSamples:
     signature: FloatArray
     shares: FloatArray
     pose: IntArray
+    vertex: IntArray
     standardizer: Standardizer
     standardized: FloatArray
 
@@ -63,6 +66,7 @@ class TrainingSamples:
             )
         shares = weights / weights.sum()
         index = np.repeat(np.arange(len(poses)), [len(pose.signature) for pose in poses])
+        vertex = np.concatenate([np.arange(len(pose.signature)) for pose in poses])
         signatures = [pose.signature for pose in poses]
         if len(shares) > MAX_SAMPLES:
             drawn = drawn_evenly(shares, MAX_SAMPLES)
@@ -72,12 +76,12 @@ class TrainingSamples:
             signatures = [
                 signature[drawn[first[i] : first[i + 1]] - starts[i]] for i, signature in enumerate(signatures)
             ]
-            shares, index = np.full(MAX_SAMPLES, 1 / MAX_SAMPLES), index[drawn]
+            shares, index, vertex = np.full(MAX_SAMPLES, 1 / MAX_SAMPLES), index[drawn], vertex[drawn]
         signature = np.concatenate(signatures)
         standardizer = Standardizer.fit(
             signature, shares, effective(parameters, "scaling"), unit_spread=parameters["preset"] == "paper"
         )
-        return cls(signature, shares, index, standardizer, standardizer.transform(signature, np.float64))
+        return cls(signature, shares, index, vertex, standardizer, standardizer.transform(signature, np.float64))
 
     @property
     def n_poses(self) -> int:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import coo_matrix, csr_matrix
 from scipy.spatial import cKDTree
 
 from ..message import Message, message_of
@@ -234,6 +234,19 @@ def _in_large_islands(mesh: TriangleMesh, faces: IntArray, pieces: IslandMode) -
     among_largest[largest_first[: MOST_ISLANDS[pieces]]] = True
     large = size >= LEAST_ISLAND_SHARE[pieces] * size.sum()
     return (among_largest & large if large.any() else among_largest)[island]
+
+
+def shares_at_vertices(surface: Surface, region: IntArray, count: int) -> FloatArray:
+    """(n', count) share of each region in the area around each vertex of the surface.
+
+    Given the region of each original face, 0 to `count` − 1; -1 for a face without a region.
+    """
+    mesh = surface.mesh
+    inside_any = (surface.face_of >= 0) & (region[surface.face_of] >= 0)
+    areas, faces, owner = mesh.face_areas[inside_any], mesh.faces[inside_any], region[surface.face_of[inside_any]]
+    entries = np.repeat(areas, 3), (faces.ravel(), np.repeat(owner, 3))
+    inside: FloatArray = coo_matrix(entries, shape=(mesh.n_vertices, count)).toarray()
+    return inside / np.maximum(inside.sum(axis=1, keepdims=True), np.finfo(float).tiny)
 
 
 def indicator(owner: IntArray, n_owners: int) -> csr_matrix:

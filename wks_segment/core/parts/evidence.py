@@ -106,15 +106,6 @@ class Evidence:
             mirrored_faces(originals[0] if rest is None else rest),
         )
 
-    def signature(self) -> FloatArray:
-        """(m, d) logarithm of the signature of each face, mean over the poses."""
-        return np.asarray(np.mean([log_signature(pose) for pose in self.poses], axis=0))
-
-
-def log_signature(pose: Workpiece) -> FloatArray:
-    """(m, d) logarithm of the signature of each original face of a pose."""
-    return pose.surface.to_faces(np.log(pose.signature + 1))
-
 
 def tied_faces(surface: Surface) -> tuple[IntArray, FloatArray]:
     """(t, 2) original faces at the ends of the ties between islands, and (t,) length of the border each stands for."""

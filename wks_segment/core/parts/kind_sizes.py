@@ -32,3 +32,7 @@ class KindSizes:
         mean = np.array([logs.mean() for logs in of_kinds])
         spread = np.array([max(float(logs.std()), LEAST_SIZE_SPREAD) for logs in of_kinds])
         return cls(mean, spread)
+
+    def of_kinds(self, kinds: IntArray) -> KindSizes:
+        """Sizes of some of the kinds, in another order."""
+        return KindSizes(self.mean[kinds], self.spread[kinds])

@@ -7,10 +7,12 @@ signatures are alike.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.spatial.distance import squareform
 
@@ -70,6 +72,36 @@ class Kinds:
     likeness: FloatArray
     sizes: KindSizes | None
 
+    @property
+    def count(self) -> int:
+        """Number of kinds."""
+        return len(self.merges) + 1
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Arrays by name, to be cached; `of_arrays` reads them."""
+        sizes = {} if self.sizes is None else {"size_mean": self.sizes.mean, "size_spread": self.sizes.spread}
+        kinds = {f"kind_{i}": kind for i, kind in enumerate(self.of_faces)}
+        return {"merges": self.merges, "likeness": self.likeness, **sizes, **kinds}
+
+    @classmethod
+    def of_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> Kinds | None:
+        """The kinds in arrays that `arrays` made; None if there are none."""
+        if "merges" not in arrays:
+            return None
+        of_faces = [arrays[f"kind_{i}"] for i in range(sum(name.startswith("kind_") for name in arrays))]
+        sizes = KindSizes(arrays["size_mean"], arrays["size_spread"]) if "size_mean" in arrays else None
+        return cls(of_faces, arrays["merges"], arrays["likeness"], sizes)
+
+
+def n_regions_of_mesh(n_segments: int) -> int:
+    """Most regions of one mesh for a number of segments."""
+    return max(MOST_GROWN, REGIONS_PER_SEGMENT * n_segments)
+
+
+def n_kinds_of_bodies(n_segments: int) -> int:
+    """Number of kinds on several meshes for a number of segments."""
+    return max(KINDS_OF_BODIES, round(KINDS_PER_SEGMENT * n_segments))
+
 
 def find_kinds(
     meshes: Sequence[Evidence], signatures: Sequence[FloatArray], n_segments: int, progress: Progress
@@ -88,12 +120,12 @@ def find_kinds(
     graphs = []
     for (evidence, signature), _ in progress.each(list(zip(meshes, signatures, strict=True))):
         graph = PartGraph.of(evidence, signature)
-        grow(graph, FINEST if len(meshes) == 1 else WHOLE, max(MOST_GROWN, REGIONS_PER_SEGMENT * n_segments))
+        grow(graph, FINEST if len(meshes) == 1 else WHOLE, n_regions_of_mesh(n_segments))
         graphs.append(graph)
     if len(meshes) == 1:
         kinds = [_repeats(meshes[0], signatures[0], graphs[0])]
     else:
-        kinds = _kinds_of_bodies(graphs, max(KINDS_OF_BODIES, round(KINDS_PER_SEGMENT * n_segments)))
+        kinds = _kinds_of_bodies(graphs, n_kinds_of_bodies(n_segments))
     logs = [np.log(graph.areas[graph.regions]) for graph in graphs]
     sizes = KindSizes.of(np.concatenate(logs), np.concatenate(kinds)) if len(meshes) > 1 else None
     of_faces, merges, likeness = _Merging(graphs, kinds).run()

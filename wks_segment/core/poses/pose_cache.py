@@ -32,6 +32,7 @@ class Kind(Enum):
     TRAITS = auto()
     SIDE_FIELD = auto()
     BORDER_SHAPE = auto()
+    OWN_PARTS = auto()
 
 
 class ResultKey(NamedTuple):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -72,3 +72,9 @@ class PoseSignature:
             int(arrays["n_eigenpairs"]),
             "delaunay" if arrays["delaunay"] else "cotangent",
         )
+
+
+def of_one_mesh(poses: Sequence[PoseSignature]) -> bool:
+    """Whether these are several poses with the same faces."""
+    faces = [pose.surface.original.faces for pose in poses]
+    return len(poses) > 1 and all(np.array_equal(faces[0], other) for other in faces[1:])

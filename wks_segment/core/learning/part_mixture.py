@@ -1,0 +1,280 @@
+"""A mixture of the signatures inside each kind of part.
+
+Signatures alone make bands of equal thickness, never a head or a finger. So the learned meshes are cut into parts
+first, by everything that is known of them (`core/parts`), and the mixture only has to recognize these: several
+components describe the signatures inside each kind of part.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from sklearn.cluster import KMeans
+from sklearn.exceptions import ConvergenceWarning
+
+from ..mesh.surface import shares_at_vertices
+from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
+from ..message import Message, message_of
+from ..parts.evidence import Evidence
+from ..parts.kind_sizes import KindSizes
+from ..parts.kinds import Kinds, find_kinds, n_kinds_of_bodies, n_regions_of_mesh
+from ..poses.pose_cache import Workpiece
+from ..poses.pose_signature import of_one_mesh
+from ..poses.signature_cache import Cache, content_key
+from ..progress import Progress
+from .gaussian_mixture import (
+    CovarianceType,
+    GaussianMixture,
+    TooFewSamplesError,
+    fit_mixtures,
+    maximize,
+    squares_of,
+    variance_floor,
+)
+from .merge_tree import MergeTree
+from .parameters import effective, least_segments
+from .standardizer import Standardizer
+from .training_samples import TrainingSamples
+
+KINDS_VERSION = 1
+"""To be raised whenever the same poses and settings give other kinds than before."""
+AXES, WHITENING, LEAST_VARIANCE = 20, 0.25, 1e-2
+"""Number of principal axes of the signatures along which parts are compared, and the power of their variance, with a
+little added, that they are divided by: later axes, which tell small parts apart, then count more, but less than the
+first ones."""
+COMPONENTS_OF_MESH, COMPONENTS_OF_BODIES, PER_SEGMENT = 150, 60, 2
+"""Number of components of the mixture of one mesh, and of several; the last for each segment if that is more. With
+more, poses and bodies that were not learned are recognized worse, with fewer, parts are not kept
+(docs/dev/experiments.md)."""
+SMOOTHING_LENGTH = 0.03
+"""Width of the smoothing along borders at smoothness 1, in units of the square root of the area."""
+ROUNDS = 2
+"""Number of times that a mixture is fitted to the parts of one mesh. After each, borders move to where they will be
+found in unseen poses."""
+VANISHED = 0.25
+"""A kind that keeps less than this share of its area when borders move is merged before all others."""
+FOUND = 0.7
+"""Share of the time of learning after which the kinds are found."""
+
+
+@dataclass(frozen=True)
+class PartMixture:
+    """What is learned of the parts of some poses.
+
+    Attributes
+    ----------
+    mixture : GaussianMixture
+    grouping : MergeTree or None
+        Order in which its components are merged into kinds of parts, and these into segments; None with the paper's
+        setting.
+    sizes : KindSizes or None
+        Of the kinds, in the order of the groups that these are, if several meshes were learned.
+    """
+
+    mixture: GaussianMixture
+    grouping: MergeTree | None
+    sizes: KindSizes | None
+
+
+def learn_parts(
+    parameters: Mapping[str, Any],
+    poses: Sequence[Workpiece],
+    training: TrainingSamples,
+    rest: TriangleMesh | None,
+    cache: Cache | None,
+    progress: Progress,
+) -> PartMixture:
+    """Find the parts of learned poses and fit a mixture to them; with the paper's setting, the mixture alone.
+
+    Parameters
+    ----------
+    parameters
+        Of the model.
+    poses
+        Of one mesh, with the same faces; otherwise each is another mesh.
+    training : TrainingSamples
+        Of the poses.
+    rest : TriangleMesh or None
+        The mesh of the first pose at rest.
+    cache : Cache or None
+        Searched for the kinds of parts; new ones are added to it.
+    progress : Progress
+
+    Raises
+    ------
+    TooFewSamplesError
+        If there are fewer distinct signatures than segments.
+    ValueError
+        If `rest` has other faces than the first pose.
+    """
+    n_segments = least_segments(parameters["n_segments"])
+    covariance_type = effective(parameters, "covariance_type")
+    if parameters["preset"] == "paper":
+        step, seed = progress.part(0.0, 1.0, "mixture"), parameters["random_state"]
+        samples, shares = training.standardized, training.shares
+        return PartMixture(fit_mixtures(samples, shares, n_segments, covariance_type, seed, 1, step)[0], None, None)
+    alone = len(poses) == 1 or of_one_mesh([pose.pose for pose in poses])
+    meshes = [poses] if alone else [[pose] for pose in poses]
+    axes = _principal_axes(training)
+    kinds = _kinds_of(meshes, training.standardizer, axes, n_segments, rest, cache, progress.part(0.0, FOUND, "parts"))
+    if covariance_type == "auto":
+        covariance_type = "tied" if alone else "shared"
+    count = max(COMPONENTS_OF_MESH if alone else COMPONENTS_OF_BODIES, PER_SEGMENT * n_segments)
+    step, of_faces = progress.part(FOUND, 1.0, "mixture"), kinds.of_faces
+    for i in range(ROUNDS if alone else 1):
+        step(i / ROUNDS)
+        kind_of_samples = _kinds_of_samples(of_faces, meshes, training, kinds.count)
+        mixture, kind = _fitted_inside(training, kind_of_samples, axes, count, covariance_type)
+        posteriors = [
+            _mean_posteriors(of_mesh, training.standardizer, mixture, kind, kinds.count) for of_mesh in meshes
+        ]
+        of_faces = [of_mesh.argmax(axis=1) for of_mesh in posteriors]
+    if len(mixture.weights) < n_segments:
+        raise TooFewSamplesError(n_segments, len(mixture.weights))
+    areas = [_mean_shares(of_mesh) for of_mesh in meshes]
+    overlaps = np.mean([p.T @ (p * a[:, None]) for p, a in zip(posteriors, areas, strict=True)], axis=0)
+    kinds = _with_vanished_first(kinds, of_faces, areas)
+    tree = MergeTree.of(mixture.means @ axes, mixture.weights, kind, kinds, overlaps)
+    kind_of_groups = np.zeros(tree.n_kinds, dtype=np.int64)
+    kind_of_groups[tree.groups(tree.n_kinds)] = kind
+    return PartMixture(mixture, tree, None if kinds.sizes is None else kinds.sizes.of_kinds(kind_of_groups))
+
+
+def _principal_axes(training: TrainingSamples) -> FloatArray:
+    """(d, AXES) principal axes of the standardized signatures, divided by a power of their variance."""
+    samples = training.standardized
+    variances, axes = np.linalg.eigh((samples * training.shares[:, None]).T @ samples)
+    chosen = slice(None, -AXES - 1, -1)
+    return np.asarray(axes[:, chosen] / (np.maximum(variances[chosen], 0) + LEAST_VARIANCE) ** WHITENING)
+
+
+def _kinds_of(
+    meshes: Sequence[Sequence[Workpiece]],
+    standardizer: Standardizer,
+    axes: FloatArray,
+    n_segments: int,
+    rest: TriangleMesh | None,
+    cache: Cache | None,
+    progress: Progress,
+) -> Kinds:
+    """Kinds of parts of the meshes, each in some poses; from a cache if they are there."""
+    key = ""
+    if cache is not None:
+        settings = standardizer.scaling, n_regions_of_mesh(n_segments), n_kinds_of_bodies(n_segments)
+        description = ("kinds", KINDS_VERSION, [len(of_mesh) for of_mesh in meshes], settings, rest is None)
+        at_rest = {} if rest is None else rest.arrays()
+        key = content_key(description, at_rest, *(pose.pose.arrays() for of_mesh in meshes for pose in of_mesh))
+        known = Kinds.of_arrays(cache.arrays(key) or {})
+        if known is not None:
+            return known
+    evidence, projected = [], []
+    for i, (of_mesh, step) in enumerate(progress.part(0.0, 0.5).each(meshes)):
+        evidence.append(Evidence.of(of_mesh, rest if i == 0 else None, step, cache))
+        in_poses = [
+            pose.surface.to_faces(standardizer.transform(pose.signature, np.float64) @ axes) for pose in of_mesh
+        ]
+        projected.append(np.mean(in_poses, axis=0))
+    kinds = find_kinds(evidence, projected, n_segments, progress.part(0.5, 1.0))
+    if cache is not None:
+        try:
+            cache.keep(key, kinds.arrays())
+        except OSError as error:
+            warnings.warn(
+                Message("parts were not kept for the next time: {reason}", reason=message_of(error)), stacklevel=3
+            )
+    return kinds
+
+
+def _kinds_of_samples(
+    of_faces: Sequence[IntArray], meshes: Sequence[Sequence[Workpiece]], training: TrainingSamples, n_kinds: int
+) -> IntArray:
+    """(n,) kind of each training sample: the one with most area around its vertex."""
+    of_poses = [
+        shares_at_vertices(pose.surface, kind, n_kinds).argmax(axis=1)
+        for of_mesh, kind in zip(meshes, of_faces, strict=True)
+        for pose in of_mesh
+    ]
+    kind_of_samples = np.empty(len(training.pose), dtype=np.int64)
+    for i, of_pose in enumerate(of_poses):
+        here = training.pose == i
+        kind_of_samples[here] = of_pose[training.vertex[here]]
+    return kind_of_samples
+
+
+def _fitted_inside(
+    training: TrainingSamples, kind_of_samples: IntArray, axes: FloatArray, count: int, covariance_type: CovarianceType
+) -> tuple[GaussianMixture, IntArray]:
+    """Mixture of about `count` components, each the samples of a cluster inside one kind; and (K,) their kinds.
+
+    Larger kinds have more clusters, by the square root of their area. With full matrices each kind has one.
+    """
+    places, shares = training.standardized @ axes, training.shares
+    # In an order that does not depend on that of the vertices, nor do the starts of k-means then.
+    in_order = np.argsort(places[:, 0], kind="stable")
+    present = np.unique(kind_of_samples)
+    sizes = np.sqrt([shares[kind_of_samples == k].sum() for k in present])
+    cluster, kinds = np.empty(len(places), dtype=np.int64), []
+    for k, size in zip(present, sizes, strict=True):
+        members = in_order[kind_of_samples[in_order] == k]
+        wanted = 1 if covariance_type == "full" else max(1, round(count * size / sizes.sum()))
+        inside = _clusters(places[members], shares[members], wanted)
+        cluster[members] = len(kinds) + inside
+        kinds += [int(k)] * (int(inside.max()) + 1)
+    masses = np.zeros((len(places), len(kinds)))
+    masses[np.arange(len(places)), cluster] = shares
+    samples = training.standardized
+    floor = variance_floor(samples, shares)
+    return maximize(samples, squares_of(samples, covariance_type), masses, covariance_type, floor), np.array(kinds)
+
+
+def _clusters(places: FloatArray, shares: FloatArray, count: int) -> IntArray:
+    """(n,) cluster of each place by k-means: 0, 1, …; fewer than `count` if there are fewer distinct places."""
+    if count == 1 or len(places) <= 1:
+        return np.zeros(len(places), dtype=np.int64)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)  # about too few distinct places
+        found = KMeans(min(count, len(places)), n_init=1, random_state=0).fit_predict(places, sample_weight=shares)
+    return np.unique(found, return_inverse=True)[1].ravel()
+
+
+def _mean_posteriors(
+    poses: Sequence[Workpiece], standardizer: Standardizer, mixture: GaussianMixture, kind: IntArray, n_kinds: int
+) -> FloatArray:
+    """(m, k) smoothed posteriors of the kinds on the faces of a mesh, mean over its poses."""
+    total: FloatArray = np.zeros(())
+    for pose in poses:
+        posteriors = mixture.group_posteriors(standardizer.transform(pose.signature), kind, n_kinds)
+        total = total + pose.surface.to_faces(pose.flows.over(SMOOTHING_LENGTH).smooth(posteriors))
+    return total / len(poses)
+
+
+def _mean_shares(poses: Sequence[Workpiece]) -> FloatArray:
+    """(m,) share of each face in the area of a mesh, mean over its poses."""
+    meshes = [pose.surface.original for pose in poses]
+    return np.asarray(np.mean([mesh.face_areas / mesh.area for mesh in meshes], axis=0))
+
+
+def _with_vanished_first(kinds: Kinds, of_faces: Sequence[IntArray], areas: Sequence[FloatArray]) -> Kinds:
+    """The kinds with those merged first that have lost most of their area, given the (m,) kind of each face now."""
+
+    def sizes(kind_of_faces: Sequence[IntArray]) -> FloatArray:
+        pairs = zip(kind_of_faces, areas, strict=True)
+        return np.sum([np.bincount(kind, area, kinds.count) for kind, area in pairs], axis=0)
+
+    vanished = np.flatnonzero(sizes(of_faces) < VANISHED * sizes(kinds.of_faces))
+    merges, likeness = kinds.merges.tolist(), kinds.likeness.tolist()
+    for lost in vanished.tolist():
+        at = next((i for i, pair in enumerate(merges) if lost in pair), None)
+        if at is None:
+            continue
+        kept, gone = merges.pop(at)
+        other = kept if lost == gone else gone
+        if lost == kept:
+            merges = [[other if one == lost else one for one in pair] for pair in merges]
+        merges.insert(0, [other, lost])
+        likeness.insert(0, likeness.pop(at))
+    return replace(kinds, merges=np.array(merges, dtype=np.int64).reshape(-1, 2), likeness=np.array(likeness))
