@@ -196,7 +196,7 @@ def _fields(
     if content["version"] == UNIONS_VERSION:
         yield _Field("cuts", (k,), least=_POSITIVE)
     else:
-        n_kinds = content.get("n_kinds")
+        n_kinds = content["n_kinds"] if isinstance(content.get("n_kinds"), int) else 0
         yield from (
             _Field("likeness", (k,)),
             _Field("n_kinds", (), 1, k, whole=True),

@@ -38,8 +38,8 @@ regions are bands between two other segments where the signature passes through 
 VOTERS = 5
 """Number of poses of a mesh that vote on its sides; more poses hardly change the result."""
 MOST_POSTERIORS = 3_000_000
-"""Maximum number of posteriors of kinds that are kept with a pose; above it, only posteriors of segments are computed, to
-save memory."""
+"""Maximum number of posteriors of kinds that are kept with a pose; above it, only those of segments are computed, to save
+memory."""
 
 
 @dataclass(frozen=True)
@@ -236,7 +236,8 @@ class Labeler:
 
     def _of_own_parts(self, poses: Sequence[Workpiece]) -> FloatArray:
         """(m, n_kept) posteriors of kinds on the faces of a mesh that is cut by its own shape."""
-        assert self.grouping is not None and self.sizes is not None
+        assert self.grouping is not None
+        assert self.sizes is not None
         sizes, group = self.sizes, self.grouping.groups(self.grouping.n_kinds)
 
         def log_likelihoods(pose: Workpiece) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Kinds of the parts of a mesh whose shape was not learned: it is cut by itself, and each part is recognized as a whole.
+"""Kinds of the parts of a body that was not learned: it is cut by its own shape, and each part recognized as a whole.
 
 Bodies differ more than poses of one body, and a signature at a single place says little on another one. So a model of
 several bodies decides on whole parts: by the signatures on all of their faces, and by their areas.

@@ -10,6 +10,7 @@ from scipy.sparse import csr_matrix, diags
 
 from ..geometry.graph_cut import CutStyle, cut_borders
 from ..mesh.adjacency import FaceAdjacency, FaceGraph, merge_small_regions
+from ..mesh.mirror import Mirror
 from ..mesh.surface import indicator
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ..poses.pose_cache import Workpiece
@@ -76,6 +77,7 @@ class PolygonMesh:
         mean_centers = sum(in_pose.centers for in_pose in in_poses) / np.maximum(times_seen, 1)[:, None]
         self._centers = np.where(fullest.seen[:, None], fullest.centers, mean_centers)
         self.areas /= np.maximum(times_seen, 1)
+        self._mirror = fullest.mirror
         self.neighbors = fullest.neighbors
 
     @property
@@ -97,7 +99,8 @@ class PolygonMesh:
         for i, (pose, in_pose) in enumerate(zip(poses, self._in_poses, strict=True)):
             total = total + in_pose.mean @ posteriors_on(pose)
             progress((i + 1) / len(poses))
-        return total / np.maximum(self._times_seen, 1)[:, None]
+        means = total / np.maximum(self._times_seen, 1)[:, None]
+        return means if self._mirror is None else self._mirror.mean(means)
 
     def labels(
         self,
@@ -131,7 +134,11 @@ class PolygonMesh:
             if marked is not None:
                 weights = np.where(self.neighbors.among(marked), MARKED_COST * weights, weights)
             labels = cut_borders(posteriors, graph, weights, cleaning.cut, labels)
-        return merge_small_regions(labels, graph, cleaning.min_share, cleaning.min_share_of_largest)
+        exact = self._mirror if self._mirror is not None and self._mirror.is_exact(self.areas) else None
+        if exact is not None:
+            labels = exact.copied(labels)
+        labels, neighbors = merge_small_regions(labels, graph, cleaning.min_share, cleaning.min_share_of_largest)
+        return labels if exact is None else exact.copied(labels), neighbors
 
 
 @dataclass(frozen=True)
@@ -151,6 +158,8 @@ class _PolygonsInPose:
         Whether each pair of neighboring triangles belongs to different polygons.
     neighbors : FaceAdjacency
         Of the polygons.
+    mirror : Mirror or None
+        Mirror images of the polygons.
     """
 
     seen: BoolArray
@@ -159,6 +168,7 @@ class _PolygonsInPose:
     mean: csr_matrix
     across: BoolArray
     neighbors: FaceAdjacency
+    mirror: Mirror | None
 
     @classmethod
     def of(cls, pose: Workpiece, polygon_of: IntArray, n_polygons: int) -> _PolygonsInPose:
@@ -170,7 +180,7 @@ class _PolygonsInPose:
         total = sum_over @ weight
         seen = np.asarray(total > 0)
         mean = csr_matrix(diags(1 / np.where(seen, total, 1)) @ sum_over @ diags(weight))
-        centers = original.unit_face_centers
+        centers, mirror = original.unit_face_centers, pose.surface.mirror
         return cls(
             seen,
             total * seen,
@@ -178,4 +188,5 @@ class _PolygonsInPose:
             mean,
             pose.neighbors.across(polygon_of),
             pose.neighbors.between_polygons(polygon_of),
+            None if mirror is None else mirror.of_polygons(polygon_of, original.face_areas, n_polygons),
         )

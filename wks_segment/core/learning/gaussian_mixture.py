@@ -107,7 +107,7 @@ class GaussianMixture:
         return np.concatenate([self.posteriors(block).astype(np.float32) @ member for block in blocks])
 
     def group_log_likelihoods(self, samples: FloatArray, group: IntArray, n_groups: int) -> FloatArray:
-        """(n, n_groups) log-density of the part of the mixture that each group of components makes, as one of its own."""
+        """(n, n_groups) log-density of each group of components as a mixture of its own."""
         logs, member = self.log_densities(samples), np.eye(n_groups)[group]
         highest = logs.max(axis=1, keepdims=True)
         sums = np.maximum(np.exp(logs - highest) @ member, np.finfo(float).tiny)
@@ -319,7 +319,7 @@ def _log_gaussians(
     covariance_type: CovarianceType,
 ) -> FloatArray:
     """(n, K) log-densities without the weights; `squares` are those of centered samples, None to compute them."""
-    n_components, dimension = means.shape
+    dimension = means.shape[1]
     if covariance_type == "tied":
         # Along axes on which the covariance is the unit matrix, distances are those of one spherical covariance.
         factor, center = np.linalg.cholesky(covariances), means.mean(axis=0)

@@ -217,7 +217,8 @@ def _fitted_inside(
     in_order = np.argsort(places[:, 0], kind="stable")
     present = np.unique(kind_of_samples)
     sizes = np.sqrt([shares[kind_of_samples == k].sum() for k in present])
-    cluster, kinds = np.empty(len(places), dtype=np.int64), []
+    cluster = np.empty(len(places), dtype=np.int64)
+    kinds: list[int] = []
     for k, size in zip(present, sizes, strict=True):
         members = in_order[kind_of_samples[in_order] == k]
         wanted = 1 if covariance_type == "full" else max(1, round(count * size / sizes.sum()))

@@ -9,14 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.spatial import cKDTree
 
 from ..message import Message, message_of
 from .islands import ties_between_islands
+from .mirror import Mirror, mirror_of
 from .repair import caps_of_small_holes, without_spikes
 from .subdivision import split_long_edges
 from .triangle_mesh import (
@@ -68,6 +70,8 @@ class Surface:
         The face of `original` that contains each face of `mesh`; -1 for faces that close a hole.
     welded_faces : (m, 3) int array
         The faces of `original` with one number for all vertices that are welded: neighbors on the surface share edges.
+    mirror : Mirror or None
+        Mirror images of the faces of `original`, at rest; None if it is not symmetric.
     """
 
     original: TriangleMesh
@@ -75,6 +79,7 @@ class Surface:
     vertex_of: IntArray
     face_of: IntArray
     welded_faces: IntArray
+    mirror: Mirror | None = None
 
     @property
     def n_islands(self) -> int:
@@ -115,11 +120,19 @@ class Connection:
         Whether each face is part of the surface.
     ties : (t, 2) int array
         Pairs of welded vertices that tie islands together.
+    mirror : Mirror or None
+        Mirror images of the faces at rest, or in the most symmetric pose; None if the mesh is not symmetric.
     """
 
     welded: IntArray
     kept: BoolArray
     ties: IntArray
+    mirror: Mirror | None = None
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Arrays by name, to tell whether two connections are the same."""
+        mirror = {} if self.mirror is None else {"image": self.mirror.image, "side": self.mirror.side}
+        return {"welded": self.welded, "kept": self.kept, "ties": self.ties, **mirror}
 
 
 def connect(*poses: TriangleMesh, rest: TriangleMesh | None = None, pieces: IslandMode = "joined") -> Connection:
@@ -150,7 +163,7 @@ def connect(*poses: TriangleMesh, rest: TriangleMesh | None = None, pieces: Isla
     ties = np.zeros((0, 2), dtype=np.int64)
     if pieces == "joined":
         ties = ties_between_islands(faces[kept], *(pose.vertices for pose in (poses if rest is None else [rest])))
-    return Connection(welded, kept, ties)
+    return Connection(welded, kept, ties, mirror_of(poses if rest is None else [rest]))
 
 
 def connect_alike(
@@ -218,7 +231,7 @@ def prepare_surface(
     ties = compact[connection.ties]
     if len(vertices) > surface.n_vertices or len(ties):
         surface = TriangleMesh(vertices, faces, ties)
-    return Surface(mesh, surface, vertex_of, face_of, welded_faces)
+    return Surface(mesh, surface, vertex_of, face_of, welded_faces, connection.mirror)
 
 
 def _in_large_islands(mesh: TriangleMesh, faces: IntArray, pieces: IslandMode) -> BoolArray:

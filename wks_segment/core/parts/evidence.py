@@ -14,13 +14,13 @@ import numpy as np
 
 from ..geometry.creases import BorderShape, border_shape
 from ..mesh.adjacency import FaceAdjacency
+from ..mesh.mirror import mirrored_faces
 from ..mesh.surface import Surface
 from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
 from ..message import Message, message_of
 from ..poses.pose_cache import Kind, ResultKey, Workpiece
 from ..poses.signature_cache import Cache, content_key
 from ..progress import Progress
-from .mirror import mirrored_faces
 
 SHAPE_VERSION = 1
 """To be raised whenever the same pose has other creases or thickness than before."""
@@ -90,6 +90,8 @@ class Evidence:
         mean = [np.mean([getattr(shapes[i], name) for i in shared], axis=0) for name in ("coarse", "fine")]
         pairs, lengths = tied_faces(first.surface)
         none = np.zeros(len(pairs))
+        mirror = first.surface.mirror
+        image = mirrored_faces(rest) if rest is not None else None if mirror is None else mirror.image
         originals = [pose.surface.original for pose in poses]
         edges = FaceAdjacency(
             np.concatenate([first.neighbors.pairs, pairs]),
@@ -103,7 +105,7 @@ class Evidence:
             np.append(mean[0], none),
             np.append(mean[1], none),
             np.mean([shape.thickness for shape in shapes], axis=0),
-            mirrored_faces(originals[0] if rest is None else rest),
+            image,
         )
 
 

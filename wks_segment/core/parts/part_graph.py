@@ -14,9 +14,9 @@ import numpy as np
 
 from ..geometry.agglomeration import merge_in_table
 from ..geometry.creases import MOST_CONCAVE, weights_of_borders
+from ..mesh.mirror import is_exact
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from .evidence import Evidence
-from .mirror import is_exact
 from .motion import edge_correlations, turns
 from .patches import patches_of
 from .visibility import visible

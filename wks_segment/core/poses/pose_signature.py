@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..mesh.mirror import Mirror
 from ..mesh.surface import Surface
 from ..mesh.triangle_mesh import FloatArray, TriangleMesh
 from ..message import Message
@@ -40,7 +41,9 @@ class PoseSignature:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Arrays by name, to be written to a file; `of_arrays` reads them."""
+        mirror = self.surface.mirror
         return {
+            **({} if mirror is None else {"mirror_image": mirror.image, "mirror_side": mirror.side}),
             **{f"original_{name}": array for name, array in self.surface.original.arrays().items()},
             **{f"surface_{name}": array for name, array in self.surface.mesh.arrays().items()},
             **{name: getattr(self.surface, name) for name in _SURFACE_MAPS},
@@ -66,8 +69,9 @@ class PoseSignature:
                     shape=signature.shape, n_vertices=surface.n_vertices,
                 )
             )  # fmt: skip
+        mirror = Mirror(arrays["mirror_image"], arrays["mirror_side"]) if "mirror_image" in arrays else None
         return cls(
-            Surface(original, surface, *(arrays[name] for name in _SURFACE_MAPS)),
+            Surface(original, surface, **{name: arrays[name] for name in _SURFACE_MAPS}, mirror=mirror),
             signature,
             int(arrays["n_eigenpairs"]),
             "delaunay" if arrays["delaunay"] else "cotangent",

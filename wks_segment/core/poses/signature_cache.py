@@ -26,7 +26,7 @@ from ..mesh.surface import Connection
 from ..mesh.triangle_mesh import TriangleMesh
 from .pose_signature import PoseSignature
 
-SIGNATURE_VERSION = 1
+SIGNATURE_VERSION = 2
 """To be raised whenever the same mesh and settings give another signature than before."""
 MEMORY = 1_000_000_000
 """Default limit of a cache in memory, in bytes: about 100 poses of 10,000 vertices."""
@@ -67,8 +67,7 @@ def signature_key(mesh: TriangleMesh, connection: Connection, settings: Mapping[
 
     The same mesh at another place in space has another key.
     """
-    arrays = {**mesh.arrays(), "welded": connection.welded, "kept": connection.kept, "ties": connection.ties}
-    return content_key((SIGNATURE_VERSION, sorted(settings.items())), arrays)
+    return content_key((SIGNATURE_VERSION, sorted(settings.items())), mesh.arrays(), connection.arrays())
 
 
 def content_key(description: object, *groups: Mapping[str, NDArray[Any]]) -> str:

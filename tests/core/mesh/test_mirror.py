@@ -3,7 +3,7 @@ import pytest
 from shapes import creature, figure, grid, icosphere, shaken, together
 
 from wks_segment.core import TriangleMesh
-from wks_segment.core.parts.mirror import is_exact, mirrored_faces
+from wks_segment.core.mesh.mirror import is_exact, mirrored_faces
 
 
 @pytest.fixture(scope="module")

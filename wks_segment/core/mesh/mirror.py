@@ -1,0 +1,134 @@
+"""Mirror symmetry of a mesh at rest: the face that is the mirror image of each face."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.spatial import cKDTree
+
+from .triangle_mesh import FloatArray, IntArray, TriangleMesh
+
+TOLERANCE, FACE_TOLERANCE = 0.003, 0.3
+"""A face is the mirror image of another if its center is off by less than `TOLERANCE` of the size of the mesh plus
+`FACE_TOLERANCE` times the root of its area: a quad may be cut along the other diagonal."""
+LEAST_SHARE = 0.5
+"""Least share of the area that must have a mirror image: below, likeness is a coincidence."""
+EXACT_SHARE = 0.999
+"""Share of the area with a mirror image above which a mesh is symmetric as a whole."""
+OUTSIDE_PLANE = 0.03
+"""Least mean distance of the faces from the mirror plane, in units of the square root of the area: a sheet is its own
+mirror image in its plane, which says nothing."""
+
+
+@dataclass(frozen=True)
+class Mirror:
+    """The mirror images of m faces or polygons.
+
+    Attributes
+    ----------
+    image : (m,) int array
+        Mirror image of each, −1 for none.
+    side : (m,) int array
+        1 and −1 on the two sides of the mirror plane, 0 on it.
+    """
+
+    image: IntArray
+    side: IntArray
+
+    def is_exact(self, areas: FloatArray) -> bool:
+        """Whether all is its own mirror image as a whole, given the (m,) areas."""
+        return bool(areas[self.image >= 0].sum() >= EXACT_SHARE * areas.sum())
+
+    def mean(self, values: FloatArray) -> FloatArray:
+        """(m, …) values, averaged with those of the mirror images."""
+        has = self.image >= 0
+        result = values.copy()
+        result[has] = (values[has] + values[self.image[has]]) / 2
+        return result
+
+    def copied(self, labels: IntArray) -> IntArray:
+        """(m,) labels with those of one side copied to the other one."""
+        second = (self.image >= 0) & (self.side < 0)
+        return np.where(second, labels[self.image], labels)
+
+    def of_polygons(self, polygon_of: IntArray, areas: FloatArray, n_polygons: int) -> Mirror:
+        """The mirror images of polygons, by those of most of their faces.
+
+        Given the polygon of each face, −1 for none, and the areas of the faces.
+        """
+        image = np.where(self.image >= 0, polygon_of[self.image], -1)
+        seen = np.flatnonzero((polygon_of >= 0) & (image >= 0))
+        pairs = coo_matrix((areas[seen], (polygon_of[seen], image[seen])), shape=(n_polygons, n_polygons)).tocsr()
+        pairs.sum_duplicates()
+        row = np.repeat(np.arange(n_polygons), np.diff(pairs.indptr))
+        order = np.lexsort((pairs.indices, -pairs.data, row))
+        first = order[np.unique(row[order], return_index=True)[1]]
+        found = np.full(n_polygons, -1)
+        found[row[first]] = pairs.indices[first]
+        mutual = (found >= 0) & (found[found] == np.arange(n_polygons))
+        inside = polygon_of >= 0
+        side = np.bincount(polygon_of[inside], (areas * self.side)[inside], n_polygons)
+        return Mirror(np.where(mutual, found, -1), np.sign(side).astype(np.int64))
+
+
+def mirror_of(meshes: Sequence[TriangleMesh]) -> Mirror | None:
+    """The mirror images of the faces of a mesh in the pose that is most symmetric; None if none is.
+
+    Given the mesh in some poses.
+    """
+    best, best_share = None, 0.0
+    for mesh in meshes:
+        found = _mirror(mesh)
+        if found is not None:
+            share = float(mesh.face_areas[found.image >= 0].sum() / mesh.area)
+            if share > best_share + 1e-6:
+                best, best_share = found, share
+    return best
+
+
+def mirrored_faces(mesh: TriangleMesh) -> IntArray | None:
+    """(m,) mirror image of each face, −1 for a face without one; None for a mesh that is not symmetric."""
+    found = _mirror(mesh)
+    return None if found is None else found.image
+
+
+def _mirror(mesh: TriangleMesh) -> Mirror | None:
+    """Mirror images of the faces of a mesh; None if it is not symmetric.
+
+    The mirror plane is perpendicular to an axis and lies in the middle of the mesh. Of several planes it is the one
+    that mirrors most of the area, the first axis if they are alike.
+    """
+    centers, areas = mesh.face_centers, mesh.face_areas
+    corners = mesh.vertices[np.unique(mesh.faces)]
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    tolerance = TOLERANCE * float((high - low).max()) + FACE_TOLERANCE * np.sqrt(areas)
+    tree = cKDTree(centers)
+    best, best_share, best_side = None, LEAST_SHARE, np.zeros(0)
+    for axis in range(3):
+        middle = (low[axis] + high[axis]) / 2
+        if np.average(np.abs(centers[:, axis] - middle), weights=areas) < OUTSIDE_PLANE * np.sqrt(mesh.area):
+            continue
+        images = centers.copy()
+        images[:, axis] = 2 * middle - images[:, axis]
+        image = _mutual(tree, images, tolerance)
+        share = float(areas[image >= 0].sum() / areas.sum())
+        if share > best_share + 1e-6:
+            best, best_share, best_side = image, share, centers[:, axis] - middle
+    return None if best is None else Mirror(best, np.sign(np.round(best_side, 12)).astype(np.int64))
+
+
+def is_exact(image: IntArray | None, areas: FloatArray) -> bool:
+    """Whether a mesh is its own mirror image as a whole."""
+    return image is not None and bool(areas[image >= 0].sum() >= EXACT_SHARE * areas.sum())
+
+
+def _mutual(tree: cKDTree, images: FloatArray, tolerance: FloatArray) -> IntArray:
+    """(m,) face at the place of each image that in turn has this face as its image; −1 for none."""
+    distance, nearest = tree.query(images)
+    own = np.arange(len(images))
+    near = distance < tolerance
+    mutual = near & near[nearest] & (nearest[nearest] == own)
+    return np.where(mutual, nearest, -1)
