@@ -21,7 +21,7 @@ from .learning.part_mixture import PartMixture
 from .learning.standardizer import LEAST_SPREAD, Standardizer
 from .mesh.triangle_mesh import FloatArray, IntArray
 from .message import Message, message_of
-from .parts.kind_sizes import KindSizes
+from .parts.kind_traits import KindTraits
 from .user_labels import PartNotes
 
 FORMAT = "wks_segment model"
@@ -76,7 +76,7 @@ class ModelContent:
 
 def encode(model: ModelContent) -> str:
     """JSON text of a model."""
-    mixture, grouping, sizes = model.learned.mixture, model.learned.grouping, model.learned.sizes
+    mixture, grouping, traits = model.learned.mixture, model.learned.grouping, model.learned.traits
     arrays: dict[str, FloatArray | IntArray] = {
         "centre": model.standardizer.mean, "spread": model.standardizer.spread, "weights": mixture.weights,
         "means": mixture.means, "covariances": mixture.covariances, "usual_scores": model.usual_scores,
@@ -88,8 +88,8 @@ def encode(model: ModelContent) -> str:
             "natural": np.array(grouping.natural),
         }
         arrays |= {name: getattr(grouping, name) for name in ("certainties", "by_chance", "likeness")}
-    if sizes is not None:
-        arrays |= {"kind_mean": sizes.mean, "kind_spread": sizes.spread}
+    if traits is not None:
+        arrays |= {f"kind_{name}": array for name, array in vars(traits).items()}
     for kind, atlas in zip(REGION_KINDS, model.atlases or (), strict=False):
         arrays |= atlas.arrays(kind)
     content = {
@@ -128,11 +128,11 @@ def decode(text: str) -> ModelContent:
         check_parameters(parameters)
     except (ValueError, TypeError) as error:
         raise ModelFileError(Message("the model has a bad parameter: {reason}", reason=message_of(error))) from error
-    grouping, sizes, atlases = None, None, None
+    grouping, traits, atlases = None, None, None
     if grouped:
         grouping = _grouping(arrays)
         if "kind_mean" in arrays:
-            sizes = KindSizes(arrays["kind_mean"], arrays["kind_spread"])
+            traits = KindTraits(*(arrays[f"kind_{name}"] for name in KindTraits.__dataclass_fields__))
         wholes, segments = (RegionAtlas.of_arrays(arrays, kind) for kind in REGION_KINDS)
         atlases = wholes, segments
     return ModelContent(
@@ -140,7 +140,7 @@ def decode(text: str) -> ModelContent:
         PartMixture(
             GaussianMixture(covariance_type, arrays["weights"], arrays["means"], arrays["covariances"]),
             grouping,
-            sizes,
+            traits,
         ),
         Standardizer(effective(parameters, "scaling"), arrays["centre"], arrays["spread"]),
         atlases,
@@ -203,7 +203,11 @@ def _fields(
             _Field("natural", (), 1, k, whole=True),
         )
         if "kind_mean" in content:
-            yield from (_Field("kind_mean", (n_kinds,)), _Field("kind_spread", (n_kinds,), least=_POSITIVE))
+            yield from (
+                _Field("kind_mean", (n_kinds,)),
+                _Field("kind_spread", (n_kinds,), least=_POSITIVE),
+                _Field("kind_touching", (n_kinds, n_kinds), least=_POSITIVE, most=1.0),
+            )
     for kind in REGION_KINDS:
         r = _length(content, f"{kind}_segment", MOST_REGIONS)
         yield from (

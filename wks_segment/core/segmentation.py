@@ -174,7 +174,7 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
         learned = learn_parts(parameters, poses, training, rest, cache, overall.part(DESCRIBED, GROUPED))
         atlases = None
         if learned.grouping is not None:
-            labeler = self._labeler_of(learned.mixture, training.standardizer, learned.grouping, learned.sizes)
+            labeler = self._labeler_of(learned.mixture, training.standardizer, learned.grouping, learned.traits)
             atlases = labeler.atlases(poses, rest, overall.part(GROUPED, 1.0, "regions"))
         self._set_learned(learned, training.standardizer, atlases, usual_scores(learned.mixture, training))
         self.part_notes_ = PartNotes()
@@ -282,8 +282,8 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
             atlases = self.regions_, self.sides_
         return model_file.encode(
             model_file.ModelContent(
-                self._parameters(), PartMixture(mixture, self.grouping_, self.kind_sizes_), self.standardizer_, atlases,
-                self.usual_scores_, self.part_notes_,
+                self._parameters(), PartMixture(mixture, self.grouping_, self.kind_traits_), self.standardizer_,
+                atlases, self.usual_scores_, self.part_notes_,
             )
         )  # fmt: skip
 
@@ -314,7 +314,7 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
         scores: FloatArray,
     ) -> None:
         self.mixture_, self.standardizer_ = learned.mixture, standardizer
-        self.grouping_, self.kind_sizes_ = learned.grouping, learned.sizes
+        self.grouping_, self.kind_traits_ = learned.grouping, learned.traits
         self.regions_, self.sides_ = atlases or (None, None)
         self.usual_scores_ = scores
 

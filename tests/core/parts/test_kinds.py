@@ -4,7 +4,7 @@ from shapes import creature, figure, icosphere, together
 
 from wks_segment.core import PoseSegmentation, TriangleMesh
 from wks_segment.core.parts.evidence import Evidence
-from wks_segment.core.parts.kind_sizes import KindSizes
+from wks_segment.core.parts.kind_traits import KindTraits
 from wks_segment.core.parts.kinds import FIRST, SMALL_KIND, find_kinds
 from wks_segment.core.poses.pose_cache import Workpiece
 from wks_segment.core.progress import Progress
@@ -179,6 +179,6 @@ def test_poses_that_do_not_move_change_nothing(body, of_body):
 
 
 def test_sizes_are_means_and_spreads_of_logarithms():
-    sizes = KindSizes.of(np.log([0.1, 0.4, 0.3, 0.2]), np.array([0, 0, 1, 2]))
+    sizes = KindTraits.of(np.log([0.1, 0.4, 0.3, 0.2]), np.array([0, 0, 1, 2]))
     np.testing.assert_allclose(np.exp(sizes.mean), [0.2, 0.3, 0.2])
     np.testing.assert_allclose(sizes.spread, [np.log(2), LEAST_SPREAD, LEAST_SPREAD])

@@ -17,11 +17,11 @@ from ..learning.merge_tree import MergeTree
 from ..learning.standardizer import Standardizer
 from ..mesh.adjacency import FaceAdjacency
 from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
-from ..parts.kind_sizes import KindSizes
+from ..parts.kind_traits import KindTraits
 from ..poses.pose_cache import Kind, ResultKey, Workpiece
 from ..poses.pose_signature import PoseSignature, of_one_mesh
 from ..progress import Progress
-from .own_parts import kinds_of_own_parts
+from .own_parts import OwnParts, own_parts
 from .polygons import Cleaning, PolygonMesh
 from .region_atlas import RegionAtlas
 from .sides import side_field, sides_of_regions
@@ -38,8 +38,8 @@ regions are bands between two other segments where the signature passes through 
 VOTERS = 5
 """Number of poses of a mesh that vote on its sides; more poses hardly change the result."""
 MOST_POSTERIORS = 3_000_000
-"""Maximum number of posteriors of kinds that are kept with a pose; above it, only those of segments are computed, to save
-memory."""
+"""Maximum number of posteriors of kinds that are kept with a pose; above it, only those of segments are computed, to
+save memory."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Labeler:
     n_segments : int
     length : float
         Smoothing length in units of the square root of the area; 0: no smoothing.
-    sizes : KindSizes or None
+    traits : KindTraits or None
         Of the kinds of parts, if the model is of several meshes: a mesh is then cut by its own shape.
     """
 
@@ -66,7 +66,7 @@ class Labeler:
     grouping: MergeTree | None
     n_segments: int
     length: float
-    sizes: KindSizes | None = None
+    traits: KindTraits | None = None
 
     @property
     def n_kept(self) -> int:
@@ -200,10 +200,15 @@ class Labeler:
 
         def compute() -> Regions:
             mesh = self._polygon_mesh(poses, None)
-            posteriors = self._mean_posteriors(mesh, poses, False, n_groups, progress)
             cleaning = Cleaning(CutStyle(self.length, REGION_CREASE, REGION_WIDTH), min_share)
+            if self.traits is None or self.grouping is None or self.length == 0:
+                posteriors, group = self._mean_posteriors(mesh, poses, False, n_groups, progress), np.arange(n_groups)
+            else:
+                own = self._own_parts(poses)
+                whole, group = own.wholes(self.grouping.group_of_groups(self.grouping.n_kinds, n_groups))
+                posteriors = np.eye(len(group))[whole][own.part]
             labels, neighbors = mesh.labels(poses, posteriors, cleaning)
-            return Regions.of(labels, neighbors, poses[0].surface.original)
+            return Regions.of(labels, neighbors, poses[0].surface.original, group)
 
         inputs = self.mixture, self.grouping, n_groups, self.length, min_share, *_pose_signatures(poses)
         return poses[0].results.get(ResultKey(Kind.REGIONS, len(poses)), inputs, compute)
@@ -229,26 +234,31 @@ class Labeler:
 
     def _on_faces(self, poses: Sequence[Workpiece], n_groups: int) -> Callable[[Workpiece], FloatArray]:
         """Function that gives the (m, n_groups) posteriors on the faces of one of the poses of a mesh."""
-        if self.sizes is None or self.length == 0:
+        if self.traits is None or self.length == 0:
             return lambda pose: pose.surface.to_faces(self.smoothed(pose, n_groups))
         together = poses if of_one_mesh(_pose_signatures(poses)) else None
-        return lambda pose: self._merged(self._of_own_parts(together or [pose]), n_groups)
 
-    def _of_own_parts(self, poses: Sequence[Workpiece]) -> FloatArray:
-        """(m, n_kept) posteriors of kinds on the faces of a mesh that is cut by its own shape."""
+        def on_faces(pose: Workpiece) -> FloatArray:
+            own = self._own_parts(together or [pose])
+            return self._merged(own.posteriors, n_groups)[own.part]
+
+        return on_faces
+
+    def _own_parts(self, poses: Sequence[Workpiece]) -> OwnParts:
+        """Parts of a mesh, in some poses, that is cut by its own shape."""
         assert self.grouping is not None
-        assert self.sizes is not None
-        sizes, group = self.sizes, self.grouping.groups(self.grouping.n_kinds)
+        assert self.traits is not None
+        traits, group = self.traits, self.grouping.groups(self.grouping.n_kinds)
 
         def log_likelihoods(pose: Workpiece) -> FloatArray:
             samples = self.standardizer.transform(pose.signature)
-            return self.mixture.group_log_likelihoods(samples, group, len(sizes.mean))
+            return self.mixture.group_log_likelihoods(samples, group, len(traits.mean))
 
         inputs = self.mixture, self.grouping, *_pose_signatures(poses)
         return poses[0].results.get(
             ResultKey(Kind.OWN_PARTS, len(poses)),
             inputs,
-            lambda: kinds_of_own_parts(poses, log_likelihoods, sizes, Progress()),
+            lambda: own_parts(poses, log_likelihoods, traits, Progress()),
         )
 
     def _keeps(self, count: int) -> bool:

@@ -15,7 +15,7 @@ from ..learning.standardizer import Standardizer
 from ..mesh.adjacency import connected_regions
 from ..mesh.triangle_mesh import FloatArray, IntArray
 from ..message import Message
-from ..parts.kind_sizes import KindSizes
+from ..parts.kind_traits import KindTraits
 from ..poses.describe import PoseDescriber
 from ..poses.pose_cache import AnyPose, Workpiece
 from ..progress import Progress, ShareFunction
@@ -31,7 +31,7 @@ class PoseLabeling(PoseDescriber):
     mixture_: GaussianMixture
     standardizer_: Standardizer
     grouping_: MergeTree | None
-    kind_sizes_: KindSizes | None
+    kind_traits_: KindTraits | None
     regions_: RegionAtlas | None
     sides_: RegionAtlas | None
 
@@ -204,17 +204,17 @@ class PoseLabeling(PoseDescriber):
     def _labeler(self) -> Labeler:
         """Labeler with the learned mixture and the current settings."""
         mixture = self._fitted()
-        return self._labeler_of(mixture, self.standardizer_, self.grouping_, self.kind_sizes_)
+        return self._labeler_of(mixture, self.standardizer_, self.grouping_, self.kind_traits_)
 
     def _labeler_of(
         self,
         mixture: GaussianMixture,
         standardizer: Standardizer,
         grouping: MergeTree | None,
-        sizes: KindSizes | None,
+        traits: KindTraits | None,
     ) -> Labeler:
         length = float(self._effective("smoothness") * SMOOTHING_LENGTH)
-        return Labeler(mixture, standardizer, grouping, self._number_of_segments(mixture, grouping), length, sizes)
+        return Labeler(mixture, standardizer, grouping, self._number_of_segments(mixture, grouping), length, traits)
 
     def _number_of_segments(self, mixture: GaussianMixture, grouping: MergeTree | None) -> int:
         return len(mixture.weights) if grouping is None else grouping.number_of(self.n_segments)

@@ -49,11 +49,13 @@ class Regions:
     segment: IntArray
 
     @classmethod
-    def of(cls, labels: IntArray, adjacency: FaceAdjacency, original: TriangleMesh) -> Regions:
-        """Regions of a mesh, given the segment of each face and the neighbors among faces."""
+    def of(
+        cls, labels: IntArray, adjacency: FaceAdjacency, original: TriangleMesh, segment_of_label: IntArray
+    ) -> Regions:
+        """Regions of a mesh, given labels of the faces, the neighbors among faces, and the segment of each label."""
         region = connected_regions(labels, adjacency)
         segment_of = np.zeros(int(region.max()) + 1, dtype=np.int64)
-        segment_of[region] = labels
+        segment_of[region] = segment_of_label[labels]
         largest = np.argsort(-np.bincount(region, original.face_areas), kind="stable")[:MOST_TRAITS]
         order = np.append(np.sort(largest), np.setdiff1d(np.arange(len(segment_of)), largest))
         return cls(np.argsort(order)[region], segment_of[np.sort(largest)])

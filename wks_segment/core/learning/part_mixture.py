@@ -20,7 +20,7 @@ from ..mesh.surface import shares_at_vertices
 from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
 from ..message import Message, message_of
 from ..parts.evidence import Evidence
-from ..parts.kind_sizes import KindSizes
+from ..parts.kind_traits import KindTraits
 from ..parts.kinds import Kinds, find_kinds, n_kinds_of_bodies, n_regions_of_mesh
 from ..poses.pose_cache import Workpiece
 from ..poses.pose_signature import of_one_mesh
@@ -71,13 +71,13 @@ class PartMixture:
     grouping : MergeTree or None
         Order in which its components are merged into kinds of parts, and these into segments; None with the paper's
         setting.
-    sizes : KindSizes or None
+    traits : KindTraits or None
         Of the kinds, in the order of the groups that these are, if several meshes were learned.
     """
 
     mixture: GaussianMixture
     grouping: MergeTree | None
-    sizes: KindSizes | None
+    traits: KindTraits | None
 
 
 def learn_parts(
@@ -141,7 +141,7 @@ def learn_parts(
     tree = MergeTree.of(mixture.means @ axes, mixture.weights, kind, kinds, overlaps)
     kind_of_groups = np.zeros(tree.n_kinds, dtype=np.int64)
     kind_of_groups[tree.groups(tree.n_kinds)] = kind
-    return PartMixture(mixture, tree, None if kinds.sizes is None else kinds.sizes.of_kinds(kind_of_groups))
+    return PartMixture(mixture, tree, None if kinds.traits is None else kinds.traits.of_kinds(kind_of_groups))
 
 
 def _principal_axes(training: TrainingSamples) -> FloatArray:

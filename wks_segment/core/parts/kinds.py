@@ -19,7 +19,7 @@ from scipy.spatial.distance import squareform
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ..progress import Progress
 from .evidence import Evidence
-from .kind_sizes import KindSizes
+from .kind_traits import KindTraits
 from .part_graph import PartGraph
 
 FINEST, WHOLE = 2.0, 0.2
@@ -63,14 +63,14 @@ class Kinds:
         Kinds that each step merges, the larger one first, whose number the result keeps.
     likeness : (k − 1,) array
         Log-odds with which each step found its two kinds to be one part.
-    sizes : KindSizes or None
+    traits : KindTraits or None
         Of the kinds, if there are several meshes: on others they help to tell which kind a part is.
     """
 
     of_faces: Sequence[IntArray]
     merges: IntArray
     likeness: FloatArray
-    sizes: KindSizes | None
+    traits: KindTraits | None
 
     @property
     def count(self) -> int:
@@ -79,9 +79,9 @@ class Kinds:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Arrays by name, to be cached; `of_arrays` reads them."""
-        sizes = {} if self.sizes is None else {"size_mean": self.sizes.mean, "size_spread": self.sizes.spread}
+        traits = {} if self.traits is None else {f"trait_{name}": array for name, array in vars(self.traits).items()}
         kinds = {f"kind_{i}": kind for i, kind in enumerate(self.of_faces)}
-        return {"merges": self.merges, "likeness": self.likeness, **sizes, **kinds}
+        return {"merges": self.merges, "likeness": self.likeness, **traits, **kinds}
 
     @classmethod
     def of_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> Kinds | None:
@@ -89,8 +89,9 @@ class Kinds:
         if "merges" not in arrays:
             return None
         of_faces = [arrays[f"kind_{i}"] for i in range(sum(name.startswith("kind_") for name in arrays))]
-        sizes = KindSizes(arrays["size_mean"], arrays["size_spread"]) if "size_mean" in arrays else None
-        return cls(of_faces, arrays["merges"], arrays["likeness"], sizes)
+        names = [name.removeprefix("trait_") for name in arrays if name.startswith("trait_")]
+        traits = KindTraits(**{name: arrays[f"trait_{name}"] for name in names}) if names else None
+        return cls(of_faces, arrays["merges"], arrays["likeness"], traits)
 
 
 def n_regions_of_mesh(n_segments: int) -> int:
@@ -126,10 +127,12 @@ def find_kinds(
         kinds = [_repeats(meshes[0], signatures[0], graphs[0])]
     else:
         kinds = _kinds_of_bodies(graphs, n_kinds_of_bodies(n_segments))
-    logs = [np.log(graph.areas[graph.regions]) for graph in graphs]
-    sizes = KindSizes.of(np.concatenate(logs), np.concatenate(kinds)) if len(meshes) > 1 else None
+    traits = None
+    if len(meshes) > 1:
+        logs = [np.log(graph.areas[graph.regions]) for graph in graphs]
+        traits = KindTraits.of(kinds, logs, [graph.touching() for graph in graphs])
     of_faces, merges, likeness = _Merging(graphs, kinds).run()
-    return Kinds(of_faces, merges, likeness, sizes)
+    return Kinds(of_faces, merges, likeness, traits)
 
 
 def grow(graph: PartGraph, least: float, most_regions: int) -> None:

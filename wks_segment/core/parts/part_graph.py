@@ -133,6 +133,11 @@ class PartGraph:
         regions = self.regions
         return self.signatures[regions] / self.areas[regions, None]
 
+    def touching(self) -> BoolArray:
+        """(r, r) which of `regions` touch."""
+        regions = self.regions
+        return np.asarray(self.lengths[np.ix_(regions, regions)] > 0)
+
     def merge(self, first: int, second: int) -> int:
         """Merge two regions; returns the number of the larger one, which stays."""
         kept, gone = (first, second) if self.areas[first] >= self.areas[second] else (second, first)
