@@ -14,9 +14,7 @@ from hypothesis import HealthCheck, settings
 
 sys.path.insert(0, str(Path(__file__).parent / "core"))
 sys.path.insert(0, str(Path(__file__).parent / "batch"))
-sys.path.insert(0, str(Path(__file__).parent / "few_starts"))
 
-import starts
 import tally
 
 EASY = {"deadline": None, "suppress_health_check": list(HealthCheck), "database": None}
@@ -36,20 +34,6 @@ process waits for another one (with `--no-loadscope-reorder`: otherwise the file
 def pytest_collection_modifyitems(items):
     place = {Path(__file__).parent / name: i for i, name in enumerate(LONGEST)}
     items.sort(key=lambda item: place.get(item.path, len(LONGEST)))
-
-
-@pytest.fixture(scope="session", autouse=True)
-def few_starts():
-    """Mixtures are learned from few starts, other than with `all_starts`."""
-    with starts.few_starts():
-        yield
-
-
-@pytest.fixture
-def all_starts():
-    """For a test of the quality of what it learns."""
-    with starts.all_starts():
-        yield
 
 
 class LinePerFile:

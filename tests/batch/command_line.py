@@ -10,8 +10,6 @@ from pathlib import Path
 from shapes import creature
 
 ROOT = Path(__file__).resolve().parents[2]
-FEW_STARTS = os.pathsep.join([str(ROOT / "tests" / "few_starts"), str(ROOT)])
-"""Python path of processes that learn models whose quality does not matter."""
 QUICK = ("--eigenpairs", "30", "--energies", "20", "--segments", "4")
 
 
@@ -24,7 +22,7 @@ def write(path, bend):
 
 def start(*arguments):
     # One thread, as children have: sums over several threads differ in their last digits.
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": FEW_STARTS}
+    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
     return subprocess.Popen(
         [sys.executable, "-m", "wks_segment", *map(str, arguments)], cwd=ROOT, env=environment, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE,

@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 import pytest
-from command_line import FEW_STARTS, QUICK, ROOT, run, start, wait_for_lines, write
+from command_line import QUICK, ROOT, run, start, wait_for_lines, write
 
 from wks_segment.batch import BatchError
 from wks_segment.core.progress import Progress
@@ -20,7 +20,7 @@ def started(*arguments, until, **environment):
     """Start a process of Dask; return it and the text that matches `until` in what it prints."""
     process = subprocess.Popen(
         [sys.executable, "-m", "distributed.cli.dask_" + arguments[0], *arguments[1:]], text=True, cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": FEW_STARTS, **environment}, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": str(ROOT), **environment}, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
     )  # fmt: skip
     for line in process.stderr:
         if match := re.search(until, line):

@@ -10,7 +10,6 @@ import hashlib
 import inspect
 
 import numpy as np
-import starts
 
 from wks_segment.core import PoseSegmentation
 from wks_segment.core.progress import Progress
@@ -63,9 +62,7 @@ def add_arrays(digest, arrays):
 
 def key_of(parameters, poses, rest, cached):
     """Everything that a fit depends on."""
-    digest = hashlib.sha256(
-        repr((sorted(parameters.items()), starts.used(), len(poses), rest is None, cached)).encode()
-    )
+    digest = hashlib.sha256(repr((sorted(parameters.items()), len(poses), rest is None, cached)).encode())
     for pose in poses:
         add_arrays(digest, getattr(pose, "pose", pose).arrays())
     if rest is not None:

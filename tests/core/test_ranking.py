@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 from shapes import creature, icosphere
-from starts import all_starts
 
 from wks_segment.core import PoseSegmentation, TriangleMesh, described_alike, rank, retrieve
 from wks_segment.core.learning.gaussian_mixture import fit_mixture
@@ -29,8 +28,7 @@ BENDS = (0.0, 0.3, 0.6)
 
 @pytest.fixture(scope="module")
 def models():
-    with all_starts():
-        return [PoseSegmentation(**QUICK).fit([make(bend) for bend in BENDS]) for make in CLASSES.values()]
+    return [PoseSegmentation(**QUICK).fit([make(bend) for bend in BENDS]) for make in CLASSES.values()]
 
 
 def ranked(models, mesh):

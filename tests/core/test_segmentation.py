@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 from shapes import creature, icosphere, split_at_every_corner, together
-from starts import all_starts
 
 from wks_segment.core import PoseSegmentation, TriangleMesh, prepare_surface
 from wks_segment.core.mesh.adjacency import FaceAdjacency, connected_regions
@@ -14,8 +13,7 @@ COARSE = [creature(bend, 3) for bend in (0.0, 0.4, 0.8)]
 
 @pytest.fixture(scope="module")
 def model():
-    with all_starts():
-        return PoseSegmentation(**SMALL).fit(POSES)
+    return PoseSegmentation(**SMALL).fit(POSES)
 
 
 @pytest.fixture(scope="module")
@@ -137,7 +135,6 @@ def test_coarse_mesh_is_refined_internally_and_labeled_on_its_own_vertices():
     assert fitted.segment_faces(coarse[0]).shape == (coarse[0].n_faces,)
 
 
-@pytest.mark.usefixtures("all_starts")
 def test_islands_get_labels_and_do_not_disturb_the_body():
     def with_eyes(bend):
         eyes = [TriangleMesh(0.1 * icosphere(1).vertices + place, icosphere(1).faces) for place in (2.0, -2.0)]

@@ -3,14 +3,9 @@
 import json
 
 import pytest
-from command_line import FEW_STARTS, QUICK, lines, run, start, wait_for_lines, write
+from command_line import QUICK, lines, run, start, wait_for_lines, write
 
 from wks_segment.core import PoseSegmentation
-
-
-@pytest.fixture(autouse=True)
-def few_starts_in_children(monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", FEW_STARTS)
 
 
 @pytest.fixture(scope="module")

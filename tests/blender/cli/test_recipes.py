@@ -17,7 +17,6 @@ PAGE = ROOT / "docs" / "recipes.md"
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```\n(?:```text\n(.*?)^```\n)?", re.MULTILINE | re.DOTALL)
 HEADING = re.compile(r"^## (.*)", re.MULTILINE)
 BENDS = (0.0, 0.3, 0.6)
-PYTHON_PATH = os.pathsep.join([str(ROOT / "tests" / "few_starts"), str(ROOT)])
 """Of the processes: models that are good enough are learned in a fraction of the time."""
 
 
@@ -69,7 +68,7 @@ def recipe_folder(extension, tmp_path_factory):
 @pytest.mark.parametrize("recipe", recipes())
 def test_recipe(recipe, recipe_folder, needs_rendering):
     shell = ["bash", "-e", "-o", "pipefail", "-c"] if recipe.language == "sh" else [sys.executable, "-c"]
-    paths = {"PATH": f"{recipe_folder / 'bin'}{os.pathsep}{os.environ['PATH']}", "PYTHONPATH": PYTHON_PATH}
+    paths = {"PATH": f"{recipe_folder / 'bin'}{os.pathsep}{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         [*shell, recipe.code], cwd=recipe_folder, env=os.environ | paths, capture_output=True, text=True, timeout=300
     )

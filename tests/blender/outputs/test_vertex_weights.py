@@ -58,7 +58,6 @@ def test_corners_decide_whether_vertices_are_known_not_the_kind_of_modifier():
     assert (read(quads).vertex_of == -1).all()
 
 
-@pytest.mark.usefixtures("all_starts")
 @pytest.mark.parametrize(
     ("kind", "options"),
     [
@@ -77,7 +76,6 @@ def test_soft_weights_through_modifiers_that_make_faces(settings, kind, options)
     assert (columns[weights.argmax(axis=1)] == numbers(obj.data, "wks_segment_vertex")).mean() > 0.9
 
 
-@pytest.mark.usefixtures("all_starts")
 def test_weights_through_polygons_are_close_to_weights_through_vertices():
     model, pose = fitted(limbed())
     described = [model.describe(pose.mesh)]

@@ -16,7 +16,7 @@ from wks_segment.blender.scene.characters import Character
 from wks_segment.blender.workflow.pipeline import Run
 from wks_segment.blender.workflow.report import Report
 
-pytestmark = pytest.mark.usefixtures("scene", "all_starts")
+pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
 QUICK = ("--eigenpairs", 60, "--energies", 40, "--segments", 5)
 ON_SIDES = ("paw", "foot", "ear_tip")

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 from shapes import LIMBS, figure, icosphere
-from starts import all_starts
 
 from wks_segment.core import PoseSegmentation, TriangleMesh
 from wks_segment.core.labeling import labeler
@@ -31,8 +30,7 @@ def number_of(numbers, faces):
 @pytest.fixture(scope="module")
 def model():
     poses = [figure(0.0, 0.0), figure(0.5, 0.1), figure(-0.3, 0.6)]
-    with all_starts():
-        return PoseSegmentation(6, n_eigenpairs=100, n_energies=60).fit(poses)
+    return PoseSegmentation(6, n_eigenpairs=100, n_energies=60).fit(poses)
 
 
 def test_left_and_right_are_two_regions_with_the_same_numbers_in_unseen_poses(model, regions_at_rest):

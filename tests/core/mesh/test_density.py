@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from shapes import figure
-from starts import all_starts
 
 from wks_segment.core import PoseSegmentation, TriangleMesh
 
@@ -46,8 +45,7 @@ def finer_on_one_side(mesh, axis=0, rounds=1):
 
 @pytest.fixture(scope="module")
 def model():
-    with all_starts():
-        return PoseSegmentation(**SMALL).fit([figure(*bend) for bend in BENDS])
+    return PoseSegmentation(**SMALL).fit([figure(*bend) for bend in BENDS])
 
 
 def share_of_equal_labels(labels, owner, expected, finer, mesh):
@@ -67,7 +65,6 @@ def test_a_mesh_that_is_finer_on_one_side_gets_the_same_labels(model, axis, roun
     assert share_of_equal_labels(model.segment_faces(finer), owner, expected, finer, mesh) > 0.97
 
 
-@pytest.mark.usefixtures("all_starts")
 def test_a_model_of_meshes_that_are_finer_on_one_side_labels_both_alike():
     uneven = PoseSegmentation(**SMALL).fit([finer_on_one_side(figure(*bend))[0] for bend in BENDS[:2]])
     mesh = figure(*UNSEEN)

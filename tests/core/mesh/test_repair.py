@@ -70,7 +70,6 @@ def test_a_cap_belongs_to_no_original_face():
     assert np.isfinite(surface.to_faces(values)).all()
 
 
-@pytest.mark.usefixtures("all_starts")
 def test_labels_survive_spikes_and_holes():
     poses = [figure(0.0, 0.0), figure(0.5, 0.1), figure(-0.3, 0.6)]
     model = PoseSegmentation(4, n_eigenpairs=60, n_energies=40).fit(poses)
