@@ -33,14 +33,12 @@ def test_values_are_means_over_the_poses(poses):
         mean = (getattr(first, name) + getattr(second, name)) / 2
         np.testing.assert_allclose(getattr(both, name), mean, rtol=1e-5, atol=1e-6)
     np.testing.assert_allclose(both.neighbors.lengths, (first.neighbors.lengths + second.neighbors.lengths) / 2)
-    np.testing.assert_allclose(both.signature(), (first.signature() + second.signature()) / 2)
     np.testing.assert_array_equal(both.centers, first.centers)
     assert both.areas.sum() == pytest.approx(1)
 
 
 def test_each_value_is_of_its_face_or_border(poses):
     evidence, m = evidence_of(*poses), poses[0].n_faces
-    assert evidence.signature().shape == (m, 10)
     for name in ("areas", "centers", "thickness", "image"):
         assert len(getattr(evidence, name)) == m
     for values in (evidence.curvature, evidence.fine_curvature, evidence.neighbors.lengths):

@@ -4,12 +4,10 @@ from shapes import creature, figure, icosphere, together
 
 from wks_segment.core import PoseSegmentation, TriangleMesh
 from wks_segment.core.parts.evidence import Evidence
-from wks_segment.core.parts.kind_traits import KindTraits
-from wks_segment.core.parts.kinds import FIRST, SMALL_KIND, find_kinds
+from wks_segment.core.parts.kind_traits import LEAST_SIZE_SPREAD, PRIOR_PAIRS, KindTraits
+from wks_segment.core.parts.kinds import FIRST, SMALL_KIND, Kinds, find_kinds
 from wks_segment.core.poses.pose_cache import Workpiece
 from wks_segment.core.progress import Progress
-
-LEAST_SPREAD = 0.25
 
 
 def kinds_of(*meshes, n_segments=4, **parameters):
@@ -19,9 +17,14 @@ def kinds_of(*meshes, n_segments=4, **parameters):
     for poses in meshes:
         described = model.describe_all(poses if isinstance(poses, list) else [poses])
         evidences.append(Evidence.of([Workpiece(pose) for pose in described], None, Progress()))
-    signatures = [evidence.signature() for evidence in evidences]
+    signatures = [mean_signature(evidence.poses) for evidence in evidences]
     mean = np.mean([signature.mean(axis=0) for signature in signatures], axis=0)
     return find_kinds(evidences, [signature - mean for signature in signatures], n_segments, Progress())
+
+
+def mean_signature(poses):
+    """(m, d) signature of the faces, mean over the poses."""
+    return np.mean([pose.surface.to_faces(pose.signature) for pose in poses], axis=0)
 
 
 def check(kinds, *meshes):
@@ -140,12 +143,29 @@ def test_several_bodies_share_kinds(bodies, of_bodies):
     assert same > 0.7
 
 
-def test_only_several_bodies_have_sizes_of_kinds(of_body, of_bodies):
-    assert of_body.sizes is None
-    count = len(of_bodies.merges) + 1
-    assert of_bodies.sizes.mean.shape == of_bodies.sizes.spread.shape == (count,)
-    assert (of_bodies.sizes.mean <= 0).all()
-    assert (of_bodies.sizes.spread >= LEAST_SPREAD).all()
+def test_only_several_bodies_have_traits_of_kinds(of_body, of_bodies):
+    assert of_body.traits is None
+    traits, count = of_bodies.traits, of_bodies.count
+    assert traits.mean.shape == traits.spread.shape == (count,)
+    assert (traits.mean <= 0).all()
+    assert (traits.spread >= LEAST_SIZE_SPREAD).all()
+    assert traits.touching.shape == (count, count)
+    assert ((traits.touching > 0) & (traits.touching < 1)).all()
+    np.testing.assert_allclose(traits.touching, traits.touching.T)
+
+
+def test_kinds_are_read_from_the_arrays_that_they_give(of_body, of_bodies):
+    for kinds in (of_body, of_bodies):
+        again = Kinds.of_arrays(kinds.arrays())
+        assert len(again.of_faces) == len(kinds.of_faces)
+        for found, expected in zip(again.of_faces, kinds.of_faces, strict=True):
+            np.testing.assert_array_equal(found, expected)
+        np.testing.assert_array_equal(again.merges, kinds.merges)
+        np.testing.assert_array_equal(again.likeness, kinds.likeness)
+        assert (again.traits is None) == (kinds.traits is None)
+    for name, array in vars(of_bodies.traits).items():
+        np.testing.assert_array_equal(getattr(again.traits, name), array)
+    assert Kinds.of_arrays({}) is None
 
 
 def test_more_segments_than_usual_have_enough_kinds(bodies):
@@ -178,7 +198,37 @@ def test_poses_that_do_not_move_change_nothing(body, of_body):
     np.testing.assert_allclose(again.likeness, of_body.likeness, atol=1e-2)
 
 
-def test_sizes_are_means_and_spreads_of_logarithms():
-    sizes = KindTraits.of(np.log([0.1, 0.4, 0.3, 0.2]), np.array([0, 0, 1, 2]))
-    np.testing.assert_allclose(np.exp(sizes.mean), [0.2, 0.3, 0.2])
-    np.testing.assert_allclose(sizes.spread, [np.log(2), LEAST_SPREAD, LEAST_SPREAD])
+def traits_of_two_meshes():
+    """Two parts of kind 0 and one of 1 on the first mesh, of which one pair touches; 0 and 2 touch on the second one."""
+    first, second = np.zeros((3, 3), dtype=bool), np.array([[False, True], [True, False]])
+    first[0, 2] = first[2, 0] = True
+    return KindTraits.of(
+        [np.array([0, 0, 1]), np.array([0, 2])],
+        [np.log([0.1, 0.4, 0.5]), np.log([0.2, 0.8])],
+        [first, second],
+    )
+
+
+def test_traits_have_means_and_spreads_of_logarithms_of_areas():
+    traits = traits_of_two_meshes()
+    np.testing.assert_allclose(np.exp(traits.mean), [0.2, 0.5, 0.8])
+    np.testing.assert_allclose(traits.spread, [np.sqrt(2 / 3) * np.log(2), LEAST_SIZE_SPREAD, LEAST_SIZE_SPREAD])
+
+
+def test_traits_have_the_share_of_pairs_that_touch_beside_the_usual_one():
+    touching = traits_of_two_meshes().touching
+    # In both orders eight pairs, of which four touch; the usual share has one more of either kind of pair.
+    usual = (4 + 1) / (8 + 2)
+    expected = np.full((3, 3), usual)
+    expected[0, 0] = (0 + PRIOR_PAIRS * usual) / (2 + PRIOR_PAIRS)
+    expected[0, 1] = expected[1, 0] = (1 + PRIOR_PAIRS * usual) / (2 + PRIOR_PAIRS)
+    expected[0, 2] = expected[2, 0] = (1 + PRIOR_PAIRS * usual) / (1 + PRIOR_PAIRS)
+    np.testing.assert_allclose(touching, expected)
+
+
+def test_traits_of_kinds_are_those_of_the_chosen_ones():
+    traits = traits_of_two_meshes()
+    chosen = traits.of_kinds(np.array([2, 0]))
+    np.testing.assert_array_equal(chosen.mean, traits.mean[[2, 0]])
+    np.testing.assert_array_equal(chosen.spread, traits.spread[[2, 0]])
+    np.testing.assert_array_equal(chosen.touching, traits.touching[[2, 0]][:, [2, 0]])

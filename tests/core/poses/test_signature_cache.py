@@ -270,30 +270,41 @@ def test_fit_with_a_cache_equals_fit_without(cache, learned, settings):
         assert cached.to_json() == model_without_a_cache(learned, number, **settings)
 
 
-def test_fit_with_another_number_of_segments_reuses_the_candidates(cache):
+def test_fit_with_another_number_of_segments_reuses_the_kinds(cache):
     stages = {}
     for number in (4, 8, 3, "auto"):
         said = stages[number] = set()
         model = PoseSegmentation(**SMALL | {"n_segments": number})
         model.fit(POSES, lambda stage, share, said=said: said.add((stage, round(share, 2))), cache=cache)
-    assert cache.kept == 1
-    assert all(len(of_number) < len(stages[4]) / 2 for number, of_number in stages.items() if number != 4)
+    assert cache.kept == len(POSES) + 1  # the creases of each pose, and the kinds of both
+    parts = {number: sum(stage == "parts" for stage, _ in said) for number, said in stages.items()}
+    assert parts.pop(4) > 10
+    assert set(parts.values()) == {0}
 
 
-def test_parameters_of_the_candidates_change_the_key():
+def test_settings_of_the_kinds_change_the_key():
     cache = Counting(MemoryCache())
     PoseSegmentation(**SMALL).fit(POSES, cache=cache)
-    changes = (
-        {"n_segments": 9}, {"covariance_type": "diag"}, {"scaling": "raw"}, {"n_energies": 21},
-        {"laplacian": "delaunay"},
-    )  # fmt: skip
-    for kept, change in enumerate(changes, start=2):
+    changes = ({"n_segments": 16}, {"scaling": "raw"}, {"n_energies": 21}, {"laplacian": "delaunay"})
+    for change in changes:
+        before = cache.kept
         PoseSegmentation(**SMALL | change).fit(POSES, cache=cache)
-        assert cache.kept == kept, change
+        assert cache.kept == before + 1, change  # the creases are the same
+    for change in ({"n_segments": 15}, {"covariance_type": "diag"}, {"smoothness": 2.0}):
+        PoseSegmentation(**SMALL | change).fit(POSES, cache=cache)
+    assert cache.kept == before + 1
 
 
-def test_candidates_with_fewer_components_than_planned_are_not_kept(cache):
-    """The number of their components depends on the number of segments."""
+def test_poses_and_rest_of_the_kinds_change_the_key():
+    cache = Counting(MemoryCache())
+    for poses, rest in ((POSES, None), (POSES[::-1], None), (POSES[:1], None), (POSES, creature(0.1, 3))):
+        before = getattr(cache, "kept", 0)
+        cached = PoseSegmentation(**SMALL).fit(poses, rest=rest, cache=cache)
+        assert cache.kept > before
+        assert cached.to_json() == PoseSegmentation(**SMALL).fit(poses, rest=rest).to_json()
+
+
+def test_a_mesh_with_few_distinct_signatures_is_learned_the_same_with_a_cache(cache):
     cube = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
     box = TriangleMesh(cube, [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6],
                               [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]])  # fmt: skip
@@ -303,9 +314,23 @@ def test_candidates_with_fewer_components_than_planned_are_not_kept(cache):
         assert cached.to_json() == PoseSegmentation(**parameters).fit([box]).to_json()
 
 
-def test_damaged_candidates_are_computed_again(tmp_path):
+def test_damaged_files_are_computed_again(tmp_path):
     cache = DiskCache(tmp_path)
     model = PoseSegmentation(**SMALL).fit(POSES, cache=cache)
     for path in tmp_path.glob("*.npz"):
         path.write_bytes(path.read_bytes()[:-200])
     assert PoseSegmentation(**SMALL).fit(POSES, cache=cache).to_json() == model.to_json()
+
+
+def test_parts_that_cannot_be_kept_give_a_warning_and_the_model():
+    class Full(MemoryCache):
+        def keep(self, key, arrays):
+            raise OSError("no space left on device")
+
+    with pytest.warns(UserWarning) as warned:
+        model = PoseSegmentation(**SMALL).fit(POSES[:1], cache=Full())
+    texts = [str(warning.message) for warning in warned]
+    assert len(texts) == 2
+    assert "creases were not kept for the next time: no space left on device" in texts
+    assert "parts were not kept for the next time: no space left on device" in texts
+    assert model.to_json() == model_without_a_cache("one pose", SMALL["n_segments"])
