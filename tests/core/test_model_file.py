@@ -1,11 +1,13 @@
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
-from shapes import creature
+from shapes import creature, figure
 
 from wks_segment.core import ModelFileError, PoseSegmentation, model_file
 
@@ -17,29 +19,55 @@ def text():
     return PoseSegmentation(3, n_eigenpairs=30, n_energies=20).fit([creature(0.0, 3)]).to_json()
 
 
+@pytest.fixture(scope="module")
+def text_of_bodies():
+    """Of two meshes, so that the kinds of parts have traits."""
+    return PoseSegmentation(3, n_eigenpairs=30, n_energies=20).fit([creature(0.0, 2, seed=0), figure(subdivisions=2)]).to_json()
+
+
 def test_a_model_is_plain_json(text):
     content = json.loads(text)
     assert content["format"] == "wks_segment model"
     assert content["parameters"]["n_segments"] == 3
 
 
+def test_the_model_of_bodies_keeps_the_traits_of_kinds(text, text_of_bodies):
+    model, mesh = PoseSegmentation.from_json(text_of_bodies), figure(0.3, 0.0, 2)
+    assert model.to_json() == text_of_bodies
+    assert len(model.kind_traits_.mean) == model.grouping_.n_kinds
+    again = PoseSegmentation.from_json(model.to_json())
+    np.testing.assert_array_equal(again.segment_faces(mesh), model.segment_faces(mesh))
+    assert PoseSegmentation.from_json(text).kind_traits_ is None
+
+
 def changed(text, change):
+    """The text after a change, and the number of components before."""
     content = json.loads(text)
+    count = len(content["weights"])
     change(content)
-    return json.dumps(content)
+    return json.dumps(content), count
+
+
+def check_refused(text, change, message):
+    """`K` in the message stands for the number of components, `L` for one less, `M` for one more."""
+    damaged, count = changed(text, change)
+    for name, number in (("K", count), ("L", count - 1), ("M", count + 1)):
+        message = re.sub(rf"\b{name}\b", str(number), message)
+    with pytest.raises(ModelFileError, match=message):
+        PoseSegmentation.from_json(damaged)
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         (lambda c: c.update(format="glTF"), "not a model of WKS Segment"),
-        (lambda c: c.update(version=99), "version 99, this program reads 4: update"),
-        (lambda c: c.update(version=3), "version 3, this program reads 4: learn it again"),
+        (lambda c: c.update(version=99), "version 99, this program reads 5: update"),
+        (lambda c: c.update(version=3), "version 3, this program reads 5: learn it again"),
         (lambda c: c.pop("means"), "means is missing"),
-        (lambda c: c["means"].pop(), r"means has the shape \(23, 20\), not \(24, 20\)"),
+        (lambda c: c["means"].pop(), r"means has the shape \(L, 20\), not \(K, 20\)"),
         (lambda c: c["means"][0].__setitem__(0, "x"), "means is missing or not numbers"),
         (lambda c: c["centre"].__setitem__(0, float("nan")), "centre has a number that is not finite"),
-        (lambda c: c["covariances"].__setitem__(0, -1.0), "not positive"),
+        (lambda c: c["covariances"][0].__setitem__(0, -1.0), "not positive"),
         (lambda c: c["spread"].__setitem__(0, 0.0), "not positive"),
         (lambda c: c.update(mixture_covariance_type="round"), "unknown covariance type"),
         (lambda c: c["parameters"].pop("n_energies"), "its parameters are not"),
@@ -50,17 +78,84 @@ def changed(text, change):
         (lambda c: c["weights"].__setitem__(0, 0.9), "weights do not sum to 1"),
         (lambda c: c.update(weights=3), "weights is missing"),
         (lambda c: c.update(weights=[1e-6] * 10_000), "has too many numbers"),
-        (lambda c: c["parameters"].update(n_segments=[3]), r"\[3\] segments of 24 components"),
-        (lambda c: c["parameters"].update(n_segments=25), "25 segments of 24 components"),
-        (lambda c: c["joins"].pop(), r"joins has the shape \(22, 2\), not \(23, 2\)"),
+        (lambda c: c["parameters"].update(n_segments=[3]), r"\[3\] segments of K components"),
+        (lambda c: c["parameters"].update(n_segments=len(c["weights"]) + 1), "M segments of K components"),
+        (lambda c: c["joins"].pop(), r"joins has the shape \(\d+, 2\), not \(L, 2\)"),
         (lambda c: c["joins"].__setitem__(1, c["joins"][0]), "which cannot be joined"),
         (lambda c: c["joins"].__setitem__(0, [0.5, 1]), "0.5, 1, which cannot be joined"),
         (lambda c: c["certainties"].__setitem__(0, 1e300), "certainties has a number of 1e"),
+        (lambda c: c.pop("likeness"), "likeness is missing"),
+        (lambda c: c["likeness"].pop(), r"likeness has the shape \(L,\), not \(K,\)"),
+        (lambda c: c.pop("n_kinds"), "n_kinds is missing"),
+        (lambda c: c.update(n_kinds=0), "n_kinds has the number 0, which is not a whole number from 1 to K"),
+        (lambda c: c.update(n_kinds=2.5), "n_kinds has the number 2.5, which is not a whole number from 1 to K"),
+        (lambda c: c.update(n_kinds=10**9), r"n_kinds has the number 1e\+09, which is not a whole number from 1 to K"),
+        (lambda c: c.update(natural=len(c["weights"]) + 1), "natural has the number M, which is not a whole number"),
+        (lambda c: c.update(version=4), "cuts is missing"),
     ],
 )
 def test_a_damaged_model_is_refused_with_the_reason(text, change, message):
-    with pytest.raises(ModelFileError, match=message):
-        PoseSegmentation.from_json(changed(text, change))
+    check_refused(text, change, message)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda c: c.pop("kind_spread"), "kind_spread is missing"),
+        (lambda c: c["kind_mean"].pop(), "kind_mean has the shape"),
+        (lambda c: c.update(n_kinds=c["n_kinds"] - 1), "kind_mean has the shape"),
+        (lambda c: c["kind_spread"].__setitem__(0, 0.0), "kind_spread has a number that is not positive"),
+        (lambda c: c["kind_touching"].pop(), "kind_touching has the shape"),
+        (lambda c: c["kind_touching"][0].__setitem__(0, 0.0), "kind_touching has a number that is not positive"),
+        (lambda c: c["kind_touching"][0].__setitem__(0, 1.0), "kind_touching has a number of 1, too large"),
+        (lambda c: c["kind_mean"].__setitem__(0, float("nan")), "kind_mean has a number that is not finite"),
+    ],
+)
+def test_damaged_traits_of_kinds_are_refused_with_the_reason(text_of_bodies, change, message):
+    check_refused(text_of_bodies, change, message)
+
+
+@pytest.fixture(scope="module")
+def old_model():
+    """Of version 4, written by WKS Segment 0.1.0; see tests/blender/test_old_files.py."""
+    return PoseSegmentation.load(ROOT / "tests/blender/data/version_0_1_0/model.json")
+
+
+def test_segments_of_an_old_model_are_unions_of_components_as_before(old_model):
+    mesh, tree = creature(0.2, 3), old_model.grouping_
+    assert (tree.n_kinds, old_model.kind_traits_) == (len(old_model.mixture_.weights), None)
+    pose = old_model.describe(mesh)
+    samples = old_model.standardizer_.transform(pose.signature)
+    components = old_model.mixture_.posteriors(samples)
+    for count in (2, 4, 7):
+        expected = components @ np.eye(count)[tree.groups(count)]
+        found = old_model.with_segments(count).predict_proba(pose)
+        np.testing.assert_allclose(found, pose.surface.to_vertices(expected), atol=1e-5)
+        assert set(old_model.with_segments(count).segment_faces(pose)) <= set(range(count))
+
+
+def test_an_open_number_of_segments_of_an_old_model_is_the_largest_that_is_nearly_as_certain_as_the_best(old_model):
+    curve = old_model.grouping_.curve()[1:16]
+    near = [number for number, certainty in enumerate(curve, start=2) if certainty >= curve.max() - 0.06]
+    assert old_model.with_segments("auto").n_segments_ == near[-1]
+
+
+def test_an_old_model_has_fragments_where_borders_are_long(old_model):
+    cuts = json.loads((ROOT / "tests/blender/data/version_0_1_0/model.json").read_text())["cuts"]
+    fragmented = next(count for count, cut in enumerate(cuts, start=1) if cut > 10)
+    for most in (2, 5, len(cuts)):
+        assert old_model.grouping_.number_of_wholes(most) == max(2, fragmented - 1)
+
+
+def test_an_old_model_is_written_in_the_new_version(old_model):
+    text = old_model.to_json()
+    assert json.loads(text)["version"] == 5
+    again = PoseSegmentation.from_json(text)
+    assert again.to_json() == text
+    assert again.with_segments("auto").n_segments_ == old_model.with_segments("auto").n_segments_
+    pose = again.describe(creature(0.2, 3))
+    np.testing.assert_array_equal(again.segment_faces(pose), old_model.segment_faces(pose))
+    np.testing.assert_array_equal(again.segment_regions(pose), old_model.segment_regions(pose))
 
 
 @pytest.mark.parametrize("foreign", ["", "{", "[]", "42", '"text"', "[" * 100_000])

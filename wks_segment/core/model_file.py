@@ -32,6 +32,8 @@ UNIONS_VERSION = 4
 MOST_CUT, BEST_WITHIN = 10.0, 0.06
 """In such a model, border by area above which groups are fragments, and how far the certainty with an open number of
 segments may be below the best."""
+LEAST_CUT = 1e-6
+"""Lower bound of borders in such a model, whose logarithm must be finite."""
 MOST_OF_PARAMETER = {"n_segments": 1000, "n_eigenpairs": 5000, "n_energies": 1000}
 """Upper bounds of parameters in a file: with more, a mesh would be refined until the memory is full."""
 MOST_NUMBER = 1e6
@@ -43,7 +45,7 @@ REGION_KINDS = ("region", "sided")
 MAX_BYTES = 20 * 2**20
 """Maximum size of a file, which would take more than a second to read: 64 segments with diagonal covariances take
 300 kB, 8 with full ones 2 MB."""
-_POSITIVE = float(np.nextafter(0.0, 1.0))
+_POSITIVE, _BELOW_ONE = float(np.nextafter(0.0, 1.0)), float(np.nextafter(1.0, 0.0))
 
 
 class ModelFileError(ValueError):
@@ -155,7 +157,9 @@ def _grouping(arrays: dict[str, FloatArray]) -> MergeTree:
     if "cuts" not in arrays:
         n_kinds, natural = int(arrays["n_kinds"]), int(arrays["natural"])
         return MergeTree(joins, certainties, by_chance, arrays["likeness"], n_kinds, natural)
-    tree = MergeTree(joins, certainties, by_chance, np.log(arrays["cuts"] / MOST_CUT), len(certainties), 1)
+    # One group has no border.
+    likeness = np.log(np.maximum(arrays["cuts"], LEAST_CUT) / MOST_CUT)
+    tree = MergeTree(joins, certainties, by_chance, likeness, len(certainties), 1)
     curve = tree.curve()[1:MOST_SEGMENTS]
     natural = 2 + int(np.flatnonzero(curve >= curve.max() - BEST_WITHIN)[-1]) if len(curve) else 1
     return replace(tree, natural=natural)
@@ -194,7 +198,7 @@ def _fields(
         _Field("by_chance", (k,)),
     )
     if content["version"] == UNIONS_VERSION:
-        yield _Field("cuts", (k,), least=_POSITIVE)
+        yield _Field("cuts", (k,), least=0.0)
     else:
         n_kinds = content["n_kinds"] if isinstance(content.get("n_kinds"), int) else 0
         yield from (
@@ -205,8 +209,8 @@ def _fields(
         if "kind_mean" in content:
             yield from (
                 _Field("kind_mean", (n_kinds,)),
-                _Field("kind_spread", (n_kinds,), least=_POSITIVE),
-                _Field("kind_touching", (n_kinds, n_kinds), least=_POSITIVE, most=1.0),
+                _Field("kind_spread", (n_kinds,), least=LEAST_SPREAD),
+                _Field("kind_touching", (n_kinds, n_kinds), least=_POSITIVE, most=_BELOW_ONE),
             )
     for kind in REGION_KINDS:
         r = _length(content, f"{kind}_segment", MOST_REGIONS)
