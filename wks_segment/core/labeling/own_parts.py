@@ -28,7 +28,7 @@ NEIGHBOR_WEIGHT = 2.0
 """Weight of the logarithm of the probability that parts of two kinds touch, or do not."""
 MOST_SWEEPS = 10
 """Most rounds over all parts. Two or three are usual."""
-SIZE_WEIGHT = 0.3
+AREA_WEIGHT = 0.3
 """Weight of the logarithm of the density of a part's area among the parts of a kind."""
 
 
@@ -94,7 +94,7 @@ def own_parts(
     mean = total / (len(poses) * areas[:, None])
     unlike = np.minimum((mean.max(axis=1, keepdims=True) - mean) / TEMPER, MOST_UNLIKE)
     deviation = (np.log(areas)[:, None] - traits.mean) / traits.spread
-    alone = -unlike - SIZE_WEIGHT * deviation**2 / 2
+    alone = -unlike - AREA_WEIGHT * deviation**2 / 2
     touch = graph.touching()
     return OwnParts(part, _with_neighbors(alone, touch, traits.touching), touch)
 
