@@ -164,7 +164,8 @@ def _kinds_of(
     """Kinds of parts of the meshes, each in some poses; from a cache if they are there."""
     key = ""
     if cache is not None:
-        settings = standardizer.scaling, n_regions_of_mesh(n_segments), n_kinds_of_bodies(n_segments)
+        n_kinds = n_kinds_of_bodies(n_segments) if len(meshes) > 1 else None
+        settings = standardizer.scaling, n_regions_of_mesh(n_segments), n_kinds
         description = ("kinds", KINDS_VERSION, [len(of_mesh) for of_mesh in meshes], settings, rest is None)
         at_rest = {} if rest is None else rest.arrays()
         key = content_key(description, at_rest, *(pose.pose.arrays() for of_mesh in meshes for pose in of_mesh))
