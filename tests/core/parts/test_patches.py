@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 from shapes import creature, figure, grid, icosphere, shaken, together
-from wks_segment.core.parts.mirror import mirrored_faces
 
 from wks_segment.core import TriangleMesh
 from wks_segment.core.mesh.adjacency import FaceAdjacency, connected_regions
+from wks_segment.core.mesh.mirror import mirrored_faces
 from wks_segment.core.parts.patches import N_PATCHES, SINGLE_FACES, patches_of
 
 
