@@ -120,7 +120,9 @@ class MergeTree:
         Corrected for chance like Cohen's kappa, so that numbers of groups can be compared; 0 for one group.
         """
         beyond = 1 - self.by_chance
-        return np.asarray((self.certainties - self.by_chance) / np.where(beyond > 0, beyond, 1))
+        curve = np.asarray((self.certainties - self.by_chance) / np.where(beyond > 0, beyond, 1))
+        curve[0] = 0.0  # whatever rounding has left of both numbers
+        return curve
 
     def number_of(self, n_segments: NSegments) -> int:
         """Number of groups for a parameter `n_segments`: itself, or the natural number for "auto"."""
