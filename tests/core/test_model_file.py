@@ -22,7 +22,8 @@ def text():
 @pytest.fixture(scope="module")
 def text_of_bodies():
     """Of two meshes, so that the kinds of parts have traits."""
-    return PoseSegmentation(3, n_eigenpairs=30, n_energies=20).fit([creature(0.0, 2, seed=0), figure(subdivisions=2)]).to_json()
+    meshes = [creature(0.0, 2, seed=0), figure(subdivisions=2)]
+    return PoseSegmentation(3, n_eigenpairs=30, n_energies=20).fit(meshes).to_json()
 
 
 def test_a_model_is_plain_json(text):

@@ -199,7 +199,7 @@ def test_poses_that_do_not_move_change_nothing(body, of_body):
 
 
 def traits_of_two_meshes():
-    """Two parts of kind 0 and one of 1 on the first mesh, of which one pair touches; 0 and 2 touch on the second one."""
+    """Parts of the kinds 0, 0 and 1 on the first mesh, of which one pair touches; 0 and 2 touch on the second one."""
     first, second = np.zeros((3, 3), dtype=bool), np.array([[False, True], [True, False]])
     first[0, 2] = first[2, 0] = True
     return KindTraits.of(
