@@ -5,7 +5,14 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from wks_segment.core import fit_mixture
-from wks_segment.core.learning.gaussian_mixture import CovarianceType
+from wks_segment.core.learning.gaussian_mixture import (
+    BLOCK_ROWS,
+    CovarianceType,
+    GaussianMixture,
+    maximize,
+    squares_of,
+    variance_floor,
+)
 
 MEANS = np.array([[4.0, 4.0, 0.0], [0.0, 0.0, 0.0], [-5.0, 1.0, 2.0]])
 SHARES = np.array([0.5, 0.3, 0.2])
@@ -53,6 +60,96 @@ def test_likelihood_is_that_of_the_normal_density(covariance_type):
     )
     np.testing.assert_allclose(mixture.log_likelihoods(samples), np.log(density), rtol=1e-8)
     np.testing.assert_allclose(mixture.posteriors(samples).sum(axis=1), 1.0)
+
+
+GROUP = np.array([1, 0, 1])
+"""Of the components of MEANS."""
+
+
+def densities(mixture, samples):
+    """(n, 3) weight times density of each component, by SciPy."""
+    return np.stack(
+        [
+            mixture.weights[k] * multivariate_normal.pdf(samples, mixture.means[k], full_covariance(mixture, k))
+            for k in range(3)
+        ],
+        axis=1,
+    )
+
+
+@pytest.mark.parametrize("covariance_type", TYPES)
+def test_posteriors_of_groups_are_sums_over_their_components(covariance_type):
+    samples, _ = drawn(400)
+    mixture = fit_mixture(samples, np.ones(len(samples)), 3, covariance_type)
+    of_components = densities(mixture, samples)
+    expected = np.stack([of_components[:, 1], of_components[:, 0] + of_components[:, 2]], axis=1)
+    expected /= expected.sum(axis=1, keepdims=True)
+    found = mixture.group_posteriors(samples, GROUP, 2)
+    assert found.dtype == np.float32
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+    # A group without components has no share.
+    more = mixture.group_posteriors(samples, GROUP, 4)
+    np.testing.assert_array_equal(more, np.pad(found, ((0, 0), (0, 2))))
+
+
+def test_posteriors_of_groups_do_not_depend_on_the_blocks(monkeypatch):
+    samples, _ = drawn(1000)
+    mixture = fit_mixture(samples, np.ones(len(samples)), 3, "diag")
+    expected = mixture.group_posteriors(samples, GROUP, 2)
+    assert len(samples) < BLOCK_ROWS
+    monkeypatch.setattr("wks_segment.core.learning.gaussian_mixture.BLOCK_ROWS", 300)
+    np.testing.assert_allclose(mixture.group_posteriors(samples, GROUP, 2), expected, atol=1e-6)
+    assert mixture.group_posteriors(samples[:0], GROUP, 2).shape == (0, 2)
+
+
+@pytest.mark.parametrize("covariance_type", TYPES)
+def test_log_likelihoods_of_groups_are_those_of_mixtures_of_their_own(covariance_type):
+    samples, _ = drawn(400)
+    mixture = fit_mixture(samples, np.ones(len(samples)), 3, covariance_type)
+    of_components = densities(mixture, samples)
+    alone = of_components[:, 1] / mixture.weights[1]
+    together = (of_components[:, 0] + of_components[:, 2]) / (mixture.weights[0] + mixture.weights[2])
+    found = mixture.group_log_likelihoods(samples, GROUP, 2)
+    np.testing.assert_allclose(found, np.log(np.stack([alone, together], axis=1)), rtol=1e-8, atol=1e-8)
+    # One group of all is the mixture itself.
+    of_all = mixture.group_log_likelihoods(samples, np.zeros(3, dtype=int), 1)
+    np.testing.assert_allclose(of_all[:, 0], mixture.log_likelihoods(samples), rtol=1e-10)
+
+
+def test_log_likelihoods_of_groups_are_finite_far_away():
+    mixture = GaussianMixture("tied", SHARES, MEANS, 0.01 * np.eye(3))
+    found = mixture.group_log_likelihoods(np.array([(1e3, 0, 0), (4.0, 4.0, 0.0)]), GROUP, 2)
+    assert np.isfinite(found).all()
+    assert found[1, 1] - found[1, 0] > 600
+
+
+@pytest.mark.parametrize("covariance_type", TYPES)
+def test_a_mixture_of_given_shares_is_that_of_plain_formulas(covariance_type):
+    samples = drawn(300, (0.5, 1.0, 0.25))[0] @ np.array([(1, 0.4, 0), (0, 1, -0.3), (0, 0, 1)])
+    generator = np.random.default_rng(1)
+    masses = generator.random((300, 3)) ** 3
+    masses /= masses.sum()
+    floor = 0.01
+    found = maximize(samples, squares_of(samples, covariance_type), masses, covariance_type, floor)
+    weights = masses.sum(axis=0)
+    means = np.stack([np.average(samples, axis=0, weights=mass) for mass in masses.T])
+    full = np.stack([np.cov(samples.T, aweights=mass, ddof=0) + floor * np.eye(3) for mass in masses.T])
+    tied = np.einsum("k,kij->ij", weights, full)
+    expected = {
+        "full": full, "tied": tied, "shared": np.diagonal(tied), "diag": np.diagonal(full, axis1=1, axis2=2),
+        "spherical": np.diagonal(full, axis1=1, axis2=2).mean(axis=1),
+    }[covariance_type]  # fmt: skip
+    np.testing.assert_allclose(found.weights, weights)
+    np.testing.assert_allclose(found.means, means, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.covariances, expected, rtol=1e-9, atol=1e-12)
+
+
+def test_the_floor_of_variances_is_a_share_of_their_mean():
+    samples, _ = drawn(500)
+    shares = np.linspace(1, 2, 500)
+    shares /= shares.sum()
+    variances = [np.cov(column, aweights=shares, ddof=0) for column in samples.T]
+    assert variance_floor(samples, shares) == pytest.approx(1e-3 * np.mean(variances))
 
 
 def test_sample_with_double_weight_counts_like_two():
