@@ -48,7 +48,7 @@ class MergeTree:
     n_kinds : int
         Number of groups that are kinds of parts: with more groups, kinds are split by signature alone.
     natural : int
-        Number of groups if it is open.
+        Number of groups if it is open: at least 2, if there are 2 components.
     """
 
     pairs: IntArray
@@ -89,7 +89,7 @@ class MergeTree:
         # What is measured with each number of groups, the fewest first; splitting kinds further changes nothing.
         certainties, by_chance = np.array(measures[::-1] + measures[:1] * len(inside)).T
         odds = np.array([-MOST_LIKENESS, *likeness[::-1], *[MOST_LIKENESS] * len(inside)])
-        natural = 1 + int(np.count_nonzero(odds[1:MOST_SEGMENTS] < TWO_PARTS))
+        natural = max(1 + int(np.count_nonzero(odds[1:MOST_SEGMENTS] < TWO_PARTS)), min(2, len(odds)))
         pairs = np.array(inside + between, dtype=np.int64).reshape(-1, 2)
         return cls(pairs, certainties, by_chance, odds, len(measures), natural)
 
