@@ -85,7 +85,7 @@ GERMAN_MESSAGES = {
     "pose {number}": "Pose {number}",
     "pose {number} of {count}": "Pose {number} von {count}",
     "mixture": "Mischung",
-    "evaluating": "Auswertung",
+    "parts": "Teile",
     "regions": "Bereiche",
     # Live, and the models that fit.
     "Labels take {seconds:.0f} seconds here, too long to update live": "Labels brauchen hier {seconds:.0f} Sekunden, zu lange für Live",
@@ -194,7 +194,7 @@ GERMAN_MESSAGES = {
     "the model is not fitted: call fit, or load a model, first": "das Modell hat nichts gelernt: erst fit aufrufen oder ein Modell laden",
     "a signature was not kept for the next time: {reason}": "eine Signatur wurde nicht für das nächste Mal behalten: {reason}",
     "creases were not kept for the next time: {reason}": "Falten wurden nicht für das nächste Mal behalten: {reason}",
-    "mixtures were not kept for the next time: {reason}": "Mischungen wurden nicht für das nächste Mal behalten: {reason}",
+    "parts were not kept for the next time: {reason}": "Teile wurden nicht für das nächste Mal behalten: {reason}",
     "min_share must be at least 0 and below 1, not {value!r}": "min_share muss mindestens 0 und kleiner als 1 sein, nicht {value!r}",
     "pose {pose} has {triangles} triangles, but polygons for {given}": "Pose {pose} hat {triangles} Dreiecke, aber Polygone für {given}",
     "the signature has {pairs} eigenpairs and {energies} energies, the model {model_pairs} and {model_energies}": "die Signatur hat {pairs} Eigenpaare und {energies} Energien, das Modell {model_pairs} und {model_energies}",
