@@ -3,6 +3,7 @@ import pytest
 from shapes import grid, icosphere, split_at_every_corner, together
 
 from wks_segment.core import TriangleMesh, connect, prepare_surface
+from wks_segment.core.mesh.surface import shares_at_vertices
 
 
 def test_a_triangle_soup_is_welded_to_the_closed_surface():
@@ -105,3 +106,23 @@ def test_a_mesh_of_many_small_islands_is_a_surface():
     cards = [TriangleMesh(grid(1, 1).vertices + (2 * i, 0, 0), grid(1, 1).faces) for i in range(1500)]
     assert prepare_surface(together(*cards), pieces="separate").n_islands == 100
     assert prepare_surface(together(*cards)).n_islands == 1
+
+
+def test_the_shares_of_regions_at_a_vertex_are_those_of_the_area_around_it():
+    mesh = icosphere(2)
+    surface = prepare_surface(mesh)
+    region = np.random.default_rng(0).integers(-1, 3, mesh.n_faces)
+    shares = shares_at_vertices(surface, region, 4)
+    assert shares.shape == (mesh.n_vertices, 4)
+    for vertex in range(0, mesh.n_vertices, 17):
+        around = (surface.mesh.faces == vertex).any(axis=1) & (region[surface.face_of] >= 0)
+        areas = np.bincount(region[surface.face_of[around]], surface.mesh.face_areas[around], 4)
+        np.testing.assert_allclose(shares[vertex], areas / max(areas.sum(), 1e-300), atol=1e-12)
+
+
+def test_a_vertex_without_a_region_around_it_has_no_shares():
+    mesh = icosphere(1)
+    upper = mesh.face_centers[:, 2] > 0
+    shares = shares_at_vertices(prepare_surface(mesh), np.where(upper, 0, -1), 1)
+    inside = np.isin(np.arange(mesh.n_vertices), mesh.faces[upper])
+    np.testing.assert_array_equal(shares[:, 0], inside)

@@ -6,6 +6,7 @@ from shapes import figure
 
 from wks_segment.core import PoseSegmentation, Workpiece
 from wks_segment.core.labeling import labeler
+from wks_segment.core.poses.pose_signature import of_one_mesh
 
 POSES = [figure(*lifted, subdivisions=3) for lifted in ((0.0, 0.0), (0.4, 0.1), (0.1, 0.5))]
 POLYGONS = [np.arange(POSES[0].n_faces) // 2] * len(POSES)
@@ -120,6 +121,13 @@ def test_open_number_of_segments_is_saved(model, described):
     assert auto.n_segments_ == model.grouping_.natural
     read = PoseSegmentation.from_json(auto.to_json())
     np.testing.assert_array_equal(read.predict(described[1]), auto.predict(described[1]))
+
+
+def test_several_poses_are_of_one_mesh_if_their_faces_are_the_same(described):
+    assert of_one_mesh(described)
+    assert not of_one_mesh(described[:1])
+    other = PoseSegmentation(6, **SETTINGS).describe(figure(subdivisions=2))
+    assert not of_one_mesh([*described, other])
 
 
 def test_impossible_numbers_of_segments_are_refused(model, described):
