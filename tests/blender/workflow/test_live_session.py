@@ -27,7 +27,7 @@ def test_moved_vertex_needs_new_signatures(walker, fits):
     assert fits == {"fit": 1, "describe": 2}
 
 
-@pytest.mark.parametrize(("name", "value"), [("smoothness", 0.0), ("min_share", 8.0), ("n_segments", 3)])
+@pytest.mark.parametrize(("name", "value"), [("smoothness", 0.0), ("min_share", 20.0), ("n_segments", 3)])
 def test_labels_follow_settings_and_equal_the_stored_models(walker, settings, session, fits, name, value):
     before = labels_of(walker)
     setattr(settings, name, value)

@@ -43,14 +43,16 @@ def test_undo_keeps_settings_when_live_is_off(walker, settings, session):
 
 
 def test_undo_of_another_step_keeps_a_refused_number(walker, settings, session):
-    settings.n_segments = 60
+    settings.preset = "paper"
+    assert OPS.learn() == {"FINISHED"}
+    settings.n_segments = 3
     rest(session)
     assert "needs a new Learn and Segment" in session.message
     bpy.ops.ed.undo_push(message="the number")
     walker.location.x = 1
     bpy.ops.ed.undo_push(message="moved")
     assert bpy.ops.ed.undo() == {"FINISHED"}
-    assert bpy.context.scene.wks_segment.n_segments == 60
+    assert bpy.context.scene.wks_segment.n_segments == 3
     assert "needs a new Learn and Segment" in session.message
 
 
