@@ -10,6 +10,8 @@ import pytest
 from shapes import creature, figure
 
 from wks_segment.core import ModelFileError, PoseSegmentation, model_file
+from wks_segment.core.learning.part_mixture import PER_SEGMENT
+from wks_segment.core.parts.patches import N_PATCHES, SINGLE_FACES
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -114,6 +116,12 @@ def test_a_damaged_model_is_refused_with_the_reason(text, change, message):
 )
 def test_damaged_traits_of_kinds_are_refused_with_the_reason(text_of_bodies, change, message):
     check_refused(text_of_bodies, change, message)
+
+
+def test_a_file_may_have_as_many_components_as_a_fit_makes():
+    """Two for each segment, and one more for each kind at most: there is at least one, and numbers are rounded."""
+    most_segments = model_file.MOST_OF_PARAMETER["n_segments"]
+    assert PER_SEGMENT * most_segments + max(N_PATCHES + 2, SINGLE_FACES) <= model_file.MOST_COMPONENTS
 
 
 @pytest.fixture(scope="module")

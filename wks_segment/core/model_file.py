@@ -38,7 +38,7 @@ MOST_OF_PARAMETER = {"n_segments": 1000, "n_eigenpairs": 5000, "n_energies": 100
 """Upper bounds of parameters in a file: with more, a mesh would be refined until the memory is full."""
 MOST_NUMBER = 1e6
 """Upper bound of numbers in a file, whose squares bound variances: beyond, single precision would overflow."""
-MOST_COMPONENTS, MOST_REGIONS, MOST_POSES = 1100, 400, 10_000
+MOST_COMPONENTS, MOST_REGIONS, MOST_POSES = 2700, 400, 10_000
 """Upper bounds of counts in a file: above what any fit makes, and small enough to be checked in a second."""
 REGION_KINDS = ("region", "sided")
 """The two atlases of a file: of wholes, and of segments by which left and right are told."""
