@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from shapes import creature
 from tally import count
 
-from wks_segment.core import ModelFileError, PoseSegmentation
+from wks_segment.core import ModelFileError, PoseSegmentation, Workpiece
 
-KINDS = ("shared", "diag", "full")
+KINDS = ("shared", "diag", "full", "bodies")
+"""Covariances of models of one pose; "bodies" is a model of two meshes, whose kinds of parts have traits."""
 STRANGE = [
     None, True, False, -1, 0, 1, 10**9, 10**400, 1e308, -1e308, 5e-324, float("nan"), float("inf"), "", "8", "x" * 1000,
     [], [[]], {}, {"a": 1}, [None], [[1.0, 2.0], [3.0]], [0.0] * 10_000,
@@ -32,8 +33,15 @@ def described(poses):
 
 
 @pytest.fixture(scope="module")
+def body():
+    return Workpiece(PoseSegmentation(3, n_eigenpairs=20, n_energies=12).describe(creature(0.4, 2)))
+
+
+@pytest.fixture(scope="module")
 def texts(described):
-    models = {kind: PoseSegmentation(3, kind, n_eigenpairs=20, n_energies=12).fit([described]) for kind in KINDS}
+    models = {kind: PoseSegmentation(3, kind, n_eigenpairs=20, n_energies=12).fit([described]) for kind in KINDS[:3]}
+    bodies = [creature(0.0, 2), creature(0.2, 2, seed=0)]
+    models["bodies"] = PoseSegmentation(3, n_eigenpairs=20, n_energies=12).fit(bodies)
     return {kind: model.to_json() for kind, model in models.items()}
 
 
@@ -90,7 +98,9 @@ DAMAGES = {damage.__name__: damage for damage in (edited, truncated, overwritten
 
 @pytest.mark.parametrize("kind", KINDS)
 @given(st.data())
-def test_a_model_or_a_reason_within_a_second_and_without_much_memory(texts, described, tmp_path_factory, kind, data):
+def test_a_model_or_a_reason_within_a_second_and_without_much_memory(
+    texts, described, body, tmp_path_factory, kind, data
+):
     name = data.draw(st.sampled_from(sorted(DAMAGES)))
     content = DAMAGES[name](data.draw, texts[kind])
     path = tmp_path_factory.getbasetemp() / "damaged.json"
@@ -111,6 +121,9 @@ def test_a_model_or_a_reason_within_a_second_and_without_much_memory(texts, desc
         return
     try:
         posteriors = model.predict_proba(described)
+        if model.kind_traits_ is not None:
+            labels = model.segment_faces(body)
+            assert 0 <= labels.min() <= labels.max() < model.n_segments_
     except ValueError as error:
         assert "energies" in str(error)  # a valid model with another number of energies than the signature
         count("model file", [name], "of another size")
