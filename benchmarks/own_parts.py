@@ -1,6 +1,6 @@
 """Parts by shape and motion alone: `python -m benchmarks.own_parts DATA [--signatures CACHE]`.
 
-Measures `core/parts`, which learning is to be built on, without any model: the Rand-index error of each shape of nine
+Measures `core/parts`, which learning begins with, without any model: the Rand-index error of each shape of nine
 Princeton classes cut by itself, and bones whole, segments pure and borders at joints of rigged characters whose kinds
 of parts are merged to eight. DATA is a folder with `psb`, `rigged` and `characters`. Prints two Markdown tables.
 """
@@ -115,7 +115,8 @@ def merged(kind: IntArray, merges: Sequence[Sequence[int]] | IntArray, number: i
 
 def _projected(evidence: Evidence) -> FloatArray:
     """(m, AXES) signatures of the faces along their principal axes, of about equal variance."""
-    values, shares = evidence.signature().astype(np.float64), evidence.areas / evidence.areas.sum()
+    in_poses = [pose.surface.to_faces(np.log(pose.signature + 1)) for pose in evidence.poses]
+    values, shares = np.mean(in_poses, axis=0, dtype=np.float64), evidence.areas / evidence.areas.sum()
     centered = values - shares @ values
     centered /= np.sqrt(shares @ centered**2) + np.finfo(float).eps
     variances, axes = np.linalg.eigh((centered * shares[:, None]).T @ centered)

@@ -16,7 +16,7 @@ from ..mesh.adjacency import FaceAdjacency
 from ..mesh.surface import Surface, indicator
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray, connected_groups, unique_edges
 from ..progress import Progress
-from .heat_flow import Flows, HeatFlow
+from .heat_flow import Flows, HeatFlow, ShortFlow
 
 FINE, COARSE = 0.012, 0.02
 """Lengths over which normals are averaged, in units of the square root of the area: smaller details are no creases."""
@@ -31,7 +31,7 @@ ROUGHNESS_COSINE = 0.5
 surface beside the first one and not its other side."""
 SEARCH_SLACK = 0.01
 """Relative error that the search for the nearest point may make."""
-MOST_BALLS = 20_000
+MOST_BALLS = 2_000
 """Most vertices at which thickness is measured; others take it from the nearest of these."""
 BALLS_AT_ONCE = 2_000
 """Balls between two reports of progress."""
@@ -81,7 +81,7 @@ def vertex_normals(surface: Surface) -> FloatArray:
     return _normalized(indicator(mesh.faces.ravel(), mesh.n_vertices) @ np.repeat(normals, 3, axis=0))
 
 
-def smooth_normals(normals: FloatArray, flow: HeatFlow) -> FloatArray:
+def smooth_normals(normals: FloatArray, flow: HeatFlow | ShortFlow) -> FloatArray:
     """(n', 3) unit normals, averaged by a heat flow."""
     return _normalized(flow.smooth(normals).astype(np.float64))
 
@@ -98,7 +98,7 @@ def curvature_across(surface: Surface, normals: FloatArray, adjacency: FaceAdjac
 
 def coarse_curvature(surface: Surface, adjacency: FaceAdjacency, flows: Flows) -> FloatArray:
     """`curvature_across` between the original faces, without small details."""
-    return curvature_across(surface, smooth_normals(vertex_normals(surface), flows.over(COARSE)), adjacency)
+    return curvature_across(surface, smooth_normals(vertex_normals(surface), flows.short(COARSE)), adjacency)
 
 
 def log_thickness(surface: Surface, normals: FloatArray, flows: Flows, progress: Progress | None = None) -> FloatArray:
@@ -136,7 +136,7 @@ def log_thickness(surface: Surface, normals: FloatArray, flows: Flows, progress:
     if stride > 1:
         radius = radius[tree.query(places)[1]]
     logs = np.log(radius + LEAST_THICKNESS)[:, None]
-    return flows.over(THICKNESS_LENGTH).smooth(logs)[:, 0].astype(np.float64)
+    return flows.short(THICKNESS_LENGTH).smooth(logs)[:, 0].astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ def border_shape(
 ) -> BorderShape:
     """Curvature across the borders between neighbors, and thickness of the faces."""
     normals = vertex_normals(surface)
-    fine, coarse = (smooth_normals(normals, flows.over(length)) for length in (FINE, COARSE))
+    fine, coarse = (smooth_normals(normals, flows.short(length)) for length in (FINE, COARSE))
     thickness = surface.to_faces(log_thickness(surface, fine, flows, progress)[:, None])[:, 0]
     return BorderShape(
         curvature_across(surface, coarse, adjacency), curvature_across(surface, fine, adjacency), thickness

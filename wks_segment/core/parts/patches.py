@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import dijkstra
 from ..mesh.adjacency import FaceAdjacency
 from ..mesh.triangle_mesh import FloatArray, IntArray, connected_groups
 
-N_PATCHES = 400
+N_PATCHES = 300
 """Number of patches that a surface is divided into; tables of pairs of patches grow with its square."""
 SINGLE_FACES = 600
 """Largest number of faces for which each face is a patch of its own."""

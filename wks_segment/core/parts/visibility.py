@@ -30,7 +30,7 @@ def visible(pose: Workpiece, faces: IntArray) -> BoolArray:
     surface = pose.surface
     unit = np.sqrt(surface.original.area)
     vertices = surface.mesh.vertices / unit
-    normals = smooth_normals(vertex_normals(surface), pose.flows.over(NORMAL_LENGTH))
+    normals = smooth_normals(vertex_normals(surface), pose.flows.short(NORMAL_LENGTH))
     tree = cKDTree(vertices)
     places = surface.original.face_centers[faces] / unit
     directions = surface.to_faces(normals)[faces]
@@ -42,7 +42,9 @@ def visible(pose: Workpiece, faces: IntArray) -> BoolArray:
         np.einsum("ij,ij->i", lines, directions[second]) > -limit
     )
     open_lines = np.flatnonzero(inward)
-    for share in (np.arange(PLACES) + 0.5) / PLACES:
+    # From the middle outward: most lines that leave the inside do so there.
+    shares = (np.arange(PLACES) + 0.5) / PLACES
+    for share in sorted(shares, key=lambda share: abs(share - 0.5)):
         at = places[first[open_lines]] + share * lines[open_lines]
         open_lines = open_lines[_inside(tree, vertices, normals, at)]
     result = np.eye(count, dtype=bool)
