@@ -151,7 +151,7 @@ NAMES = {"one": "1 process", "two": "2 processes", "dask": "2 Dask workers", "ki
 
 
 def cached(characters: list[Path], output: Path) -> None:
-    """Print the seconds for another number of segments, with signatures and mixtures of the first fit in a cache."""
+    """Print the seconds for another number of segments, with signatures and parts of the first fit in a cache."""
     import bpy
 
     import wks_segment.blender

@@ -1,4 +1,4 @@
-"""Segments that are the same in every pose: one Gaussian mixture over the signatures of several poses.
+"""Segments that are the same in every pose: parts by shape and motion, recognized by one mixture of their signatures.
 
 Aubry, Schlickewei and Cremers, "Pose-consistent 3D shape segmentation based on a quantum mechanical feature
 descriptor" (2011).
@@ -50,14 +50,13 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
     Parameters
     ----------
     n_segments : int or "auto"
-        Number of segments, where left and right count as one. A segment is a group of components of the mixture; with
-        the paper's setting, each component is a segment. "auto": the largest number whose certainty is close to the
-        best, see `MergeTree.best_number`; not with the paper's setting.
+        Number of segments, where left and right count as one. A segment is a group of kinds of parts, each of which is
+        a group of components of the mixture; with the paper's setting, each component is a segment. "auto": as many as
+        there are distinct parts, see `MergeTree.natural`; not with the paper's setting.
     covariance_type : "auto", "shared", "diag", "full", "tied" or "spherical"
-        "shared" is one diagonal covariance for all components, which the paper proposes, and the most robust choice for
-        bodies that were not learned. "auto" also tries "diag" and takes it if its labels agree far better between poses
-        of one mesh, or if its regions on several bodies are more like cuts along creases. "tied" and "full" have one
-        component for each segment.
+        "shared" is one diagonal covariance for all components, which the paper proposes; "tied" is one full matrix for
+        all, which fits poses of one mesh more closely, but over-fits on several bodies. "auto" is "tied" if all poses
+        are of one mesh, and "shared" on several. "full" has one component for each kind of part.
     n_eigenpairs : int
         Number of eigenpairs of each pose, not counting the zero modes of further islands.
     n_energies : int
@@ -88,7 +87,11 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
     centre_, spread_ : (n_energies,) arrays
         Mean and standard deviation of the scaled training signatures over the area.
     grouping_ : MergeTree or None
-        Order in which components are merged into segments; None with the paper's setting.
+        Order in which components are merged into kinds of parts, and these into segments; None with the paper's
+        setting.
+    kind_traits_ : KindTraits or None
+        Sizes of the parts of each kind, and which kinds touch, if several meshes were learned: a mesh is then cut by
+        its own shape, and each of its parts gets one kind. Otherwise None.
     regions_ : RegionAtlas or None
         Connected regions of the learned poses; None with the paper's setting.
     sides_ : RegionAtlas or None
@@ -153,8 +156,9 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
             The mesh of the first pose in its rest position, where +x is the left of the character, as in Blender and
             glTF: it tells left from right. If not given, the first pose does.
         cache : Cache, optional
-            Searched for results that take long; new results are added to it. A fit to the same poses with another
-            number of segments then takes a fraction of the time, and gives exactly the same result as without a cache.
+            Searched for signatures, creases and kinds of parts; new ones are added to it. A fit to the same poses with
+            another number of segments then takes a fraction of the time, as long as the number of regions of the mesh
+            (see `with_segments`) is the same. The result is exactly the same as without a cache.
 
         Raises
         ------
@@ -211,9 +215,10 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
     ) -> PoseSegmentation:
         """A copy of the model with another number of segments, at once: its components merged into as many groups.
 
-        A new fit gives another result: it makes more components for more than eight segments, takes the mixture whose
-        groups agree best at this number, and merges segments that are only small regions at it. From eight to fewer
-        segments labels are much the same, to more they differ: docs/method.md has numbers.
+        A new fit gives the same segments as long as it cuts the meshes into as many regions and kinds of parts, and
+        makes as many components: on one mesh for up to 15 segments (`n_regions_of_mesh`), on several for up to 8
+        (`n_kinds_of_bodies`). For more, a new fit looks for finer parts. With more segments than kinds of parts, kinds
+        are split by their signatures.
 
         Parameters
         ----------

@@ -32,7 +32,7 @@ LABEL_SETTINGS: dict[str, dict[str, Any]] = {
     },
     "auto_segments": {
         "name": "Automatic",
-        "description": "As many segments as the poses show with certainty, up to 16",
+        "description": "As many segments as there are distinct parts by shape and motion, up to 16",
         "default": False,
     },
     "sides": {
@@ -151,12 +151,12 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         name="Covariance",
         description="Shape that the mixture gives to each of its components",
         items=[
-            ("auto", "Automatic", "The type that generalizes best to unseen poses"),
-            ("shared", "Shared", "One diagonal covariance for all segments, the most robust"),
-            ("diag", "Diagonal", "A diagonal covariance for each segment"),
-            ("spherical", "Spherical", "One variance for each segment"),
-            ("tied", "Tied", "One full covariance for all segments"),
-            ("full", "Full", "A full covariance for each segment, which overfits with few poses"),
+            ("auto", "Automatic", "Tied for poses of one mesh, Shared for several bodies"),
+            ("shared", "Shared", "One diagonal covariance for all components, which transfers best to other bodies"),
+            ("diag", "Diagonal", "A diagonal covariance for each component"),
+            ("spherical", "Spherical", "One variance for each component"),
+            ("tied", "Tied", "One full covariance for all components, which overfits on several bodies"),
+            ("full", "Full", "A full covariance for each kind of part, which overfits with few poses"),
         ],
         default="auto",
     )

@@ -16,7 +16,7 @@ def certainties(model: PoseSegmentation) -> dict[int, float] | None:
 
 
 def certainty_lines(model: PoseSegmentation) -> list[str]:
-    """A line that says why the model has as many segments as it has, if the number was automatic; else none."""
+    """A line that says how certain each number of segments is, if the number was automatic; else none."""
     shares = certainties(model)
     if model.n_segments != "auto" or not shares:
         return []

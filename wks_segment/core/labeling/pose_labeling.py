@@ -67,6 +67,8 @@ class PoseLabeling(PoseDescriber):
 
         `min_share` is 0.005 if not given, and 0 without smoothing. Unless it is 0, no region is smaller than 15 % of
         the largest one of its segment either. An island that is smaller as a whole takes the label of its surroundings.
+        With a model of several meshes, and smoothing, the mesh is cut by its own shape, and the segment is that of a
+        whole part. Faces of an exactly symmetric mesh have the label of their mirror images.
         """
         return self._labeler().segments([self._described(mesh)], None, self._min_share(min_share), Progress())[0]
 
@@ -76,7 +78,7 @@ class PoseLabeling(PoseDescriber):
 
         Region i of one pose is region i of every other pose, on any meshing: numbers are those of `regions_`; regions
         that were not learned have higher numbers, and a pose may lack some. They are connected regions of segments,
-        except that segments whose common border is long for their areas are one here: as whole as people see them. With
+        except that segments which are most likely fragments of one part are one here: as whole as people see them. With
         the paper's setting they are the connected regions of the components, in the order of these. Regions smaller
         than `min_share` of the area belong to a neighboring region.
         """
