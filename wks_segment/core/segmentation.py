@@ -225,8 +225,8 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
         n_segments : int or "auto"
             As for a new model, but at most the number of components.
         poses, optional
-            The learned poses. `segment_regions` then finds the regions of the new segments; without them it finds the
-            learned ones, which also serve `polygon_sides`.
+            The learned poses, as `describe_all` gives them together. `segment_regions` then finds the regions of the
+            new segments; without them it finds the learned ones, which also serve `polygon_sides`.
         rest : TriangleMesh, optional
             As for `fit`.
 
