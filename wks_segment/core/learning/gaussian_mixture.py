@@ -28,6 +28,9 @@ CovarianceType = Literal["shared", "diag", "full", "tied", "spherical"]
 VARIANCE_FLOOR = 1e-3
 """Added to every variance, as a fraction of the mean variance of the samples: keeps a component from shrinking to one
 point, where its likelihood would be infinite."""
+SHRINKAGE = 0.02
+"""How far the full matrix that all components share ("tied") is moved toward its diagonal: poses that were not learned
+vary in directions in which the learned ones happen not to."""
 MAX_ITERATIONS = 200
 """Maximum number of EM rounds, in case `EM_TOLERANCE` does not end them."""
 EM_TOLERANCE = 1e-3
@@ -285,30 +288,70 @@ def maximize(
 
     `squares` are the (n, d) squares of the samples, None with full matrices; `floor` is added to each variance.
     """
-    # An empty component keeps a vanishing weight, against a division by zero.
-    weights = masses.sum(axis=0, dtype=np.float64) + 10 * np.finfo(float).tiny ** 0.5
-    means = (masses.T @ samples).astype(np.float64) / weights[:, None]
-    covariances: FloatArray
-    if covariance_type == "tied":
-        # One product for all components: samples are standardized, so that the difference keeps its digits.
-        covariances = (samples * masses.sum(axis=1)[:, None]).T @ samples - (means * weights[:, None]).T @ means
-        covariances = (covariances + covariances.T) / 2 + floor * np.eye(samples.shape[1])
-    elif squares is None:
-        scatter = np.stack([_scatter(samples - mean, mass) for mean, mass in zip(means, masses.T, strict=True)])
-        covariances = scatter / weights[:, None, None] + floor * np.eye(samples.shape[1])
-    elif covariance_type == "shared":
-        # The sum over components comes first: it needs one row of squares instead of one for each component.
-        covariances = np.maximum((masses.sum(axis=1) @ squares).astype(np.float64) - weights @ means**2, 0) + floor
-    else:
-        covariances = np.maximum((masses.T @ squares).astype(np.float64) / weights[:, None] - means**2, 0) + floor
-        if covariance_type == "spherical":
-            covariances = covariances.mean(axis=1)
-    return GaussianMixture(covariance_type, weights / weights.sum(), means, covariances)
+    return Moments.of(samples, squares, masses, covariance_type).mixture(covariance_type, floor)
 
 
-def _scatter(centered: FloatArray, mass: FloatArray) -> FloatArray:
-    """(d, d) weighted sum of outer products of centered samples."""
-    return (centered * mass[:, None]).T @ centered
+@dataclass(frozen=True)
+class Moments:
+    """Sums over samples that an M-step needs; those of two sets of samples add up.
+
+    Attributes
+    ----------
+    weights : (K,) array
+        Sum of the masses of each component.
+    first : (K, d) array
+        Sum of masses times samples.
+    second : array
+        Sum of masses times products of the samples: of the shape of the covariances, except (K, d) for "spherical".
+    """
+
+    weights: FloatArray
+    first: FloatArray
+    second: FloatArray
+
+    @classmethod
+    def of(
+        cls, samples: FloatArray, squares: FloatArray | None, masses: FloatArray, covariance_type: CovarianceType
+    ) -> Moments:
+        """Sums over (n, d) samples with (n, K) masses; see `maximize`."""
+        second: FloatArray
+        if covariance_type == "tied":
+            second = (samples * masses.sum(axis=1)[:, None]).T @ samples
+        elif squares is None:
+            second = np.stack([(samples * mass[:, None]).T @ samples for mass in masses.T])
+        else:
+            # The sum over components comes first: it needs one row of squares instead of one for each component.
+            second = (masses.sum(axis=1) if covariance_type == "shared" else masses.T) @ squares
+        weights = masses.sum(axis=0, dtype=np.float64)
+        return cls(weights, (masses.T @ samples).astype(np.float64), second.astype(np.float64))
+
+    def plus(self, others: Moments) -> Moments:
+        """The sums over these samples and others."""
+        return Moments(self.weights + others.weights, self.first + others.first, self.second + others.second)
+
+    def mixture(self, covariance_type: CovarianceType, floor: float) -> GaussianMixture:
+        """The likeliest mixture; `floor` is added to each variance."""
+        total = self.weights.sum()
+        # An empty component keeps a vanishing weight, against a division by zero.
+        weights = np.maximum(self.weights / total, 0) + 10 * np.finfo(float).tiny ** 0.5
+        means, second = self.first / total / weights[:, None], self.second / total
+        dimension = means.shape[1]
+        covariances: FloatArray
+        if covariance_type == "tied":
+            covariances = second - (means * weights[:, None]).T @ means
+            covariances = (1 - SHRINKAGE) * (covariances + covariances.T) / 2 + floor * np.eye(dimension)
+            covariances += SHRINKAGE * np.diag(np.diag(covariances))
+        elif covariance_type == "full":
+            covariances = (
+                second / weights[:, None, None] - means[:, :, None] * means[:, None] + floor * np.eye(dimension)
+            )
+        elif covariance_type == "shared":
+            covariances = np.maximum(second - weights @ means**2, 0) + floor
+        else:
+            covariances = np.maximum(second / weights[:, None] - means**2, 0) + floor
+            if covariance_type == "spherical":
+                covariances = covariances.mean(axis=1)
+        return GaussianMixture(covariance_type, weights / weights.sum(), means, covariances)
 
 
 def _log_gaussians(
@@ -323,9 +366,10 @@ def _log_gaussians(
     if covariance_type == "tied":
         # Along axes on which the covariance is the unit matrix, distances are those of one spherical covariance.
         factor, center = np.linalg.cholesky(covariances), means.mean(axis=0)
-        log_determinant = float(np.log(np.diagonal(factor)).sum())
-        along = [solve_triangular(factor, (x - center).T, lower=True).T for x in (samples, means)]
-        return _log_gaussians(along[0], along[0] ** 2, along[1], np.ones(dimension), "shared") - log_determinant
+        axes = solve_triangular(factor, np.eye(dimension), lower=True).T
+        x, mu = ((samples - center) @ axes).astype(samples.dtype), (means - center) @ axes
+        log_determinant = samples.dtype.type(np.log(np.diagonal(factor)).sum())
+        return _log_gaussians(x, x**2, mu, np.ones(dimension), "shared") - log_determinant
     if covariance_type == "full":
         factors = np.linalg.cholesky(covariances)
         half_log_determinants = np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import reduce
+
 import numpy as np
 
 from ..mesh.triangle_mesh import FloatArray, IntArray
-from .gaussian_mixture import GaussianMixture, maximize, squares_of, variance_floor
+from .gaussian_mixture import GaussianMixture, Moments, squares_of, variance_floor
 from .standardizer import Standardizer
 from .training_samples import TrainingSamples
 
@@ -81,12 +83,12 @@ def left_out_likelihoods(
     (n,) log-likelihoods.
     """
     floor = variance_floor(samples, shares)
-    squares = squares_of(samples, mixture.covariance_type)
+    kind = mixture.covariance_type
     masses = mixture.posteriors(samples) * shares[:, None]
+    groups = [group == i for i in np.unique(group)]
+    moments = [Moments.of(samples[one], squares_of(samples[one], kind), masses[one], kind) for one in groups]
     likelihoods = np.empty(len(samples))
-    for i in np.unique(group):
-        inside = group == i
-        remaining = masses * ~inside[:, None]
-        without = maximize(samples, squares, remaining / remaining.sum(), mixture.covariance_type, floor)
-        likelihoods[inside] = without.log_likelihoods(samples[inside])
+    for inside, own in zip(groups, moments, strict=True):
+        others = reduce(Moments.plus, (one for one in moments if one is not own))
+        likelihoods[inside] = others.mixture(kind, floor).log_likelihoods(samples[inside])
     return likelihoods

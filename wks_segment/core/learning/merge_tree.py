@@ -20,7 +20,7 @@ from .parameters import NSegments
 
 MOST_SEGMENTS = 16
 """If the number of segments is open, it is at most this."""
-TWO_PARTS = -2.0
+TWO_PARTS = -1.0
 """Log-odds below which a merge joins what is surely two parts, so that an open number of segments keeps them apart."""
 ONE_PART = 0.0
 """Log-odds above which two groups are fragments of what people see as one."""

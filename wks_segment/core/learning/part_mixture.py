@@ -46,15 +46,12 @@ AXES, WHITENING, LEAST_VARIANCE = 20, 0.25, 1e-2
 """Number of principal axes of the signatures along which parts are compared, and the power of their variance, with a
 little added, that they are divided by: later axes, which tell small parts apart, then count more, but less than the
 first ones."""
-COMPONENTS_OF_MESH, COMPONENTS_OF_BODIES, PER_SEGMENT = 150, 60, 2
+COMPONENTS_OF_MESH, COMPONENTS_OF_BODIES, PER_SEGMENT = 100, 60, 2
 """Number of components of the mixture of one mesh, and of several; the last for each segment if that is more. With
 more, poses and bodies that were not learned are recognized worse, with fewer, parts are not kept
 (docs/dev/experiments.md)."""
 SMOOTHING_LENGTH = 0.03
 """Width of the smoothing along borders at smoothness 1, in units of the square root of the area."""
-ROUNDS = 2
-"""Number of times that a mixture is fitted to the parts of one mesh. After each, borders move to where they will be
-found in unseen poses."""
 VANISHED = 0.25
 """A kind that keeps less than this share of its area when borders move is merged before all others."""
 FOUND = 0.7
@@ -124,20 +121,21 @@ def learn_parts(
     if covariance_type == "auto":
         covariance_type = "tied" if alone else "shared"
     count = max(COMPONENTS_OF_MESH if alone else COMPONENTS_OF_BODIES, PER_SEGMENT * n_segments)
-    step, of_faces = progress.part(FOUND, 1.0, "mixture"), kinds.of_faces
-    for i in range(ROUNDS if alone else 1):
-        step(i / ROUNDS)
-        kind_of_samples = _kinds_of_samples(of_faces, meshes, training, kinds.count)
+    step = progress.part(FOUND, 1.0, "mixture")
+    kind_of_samples = _kinds_of_samples(kinds.of_faces, meshes, training, kinds.count)
+    mixture, kind = _fitted_inside(training, kind_of_samples, axes, count, covariance_type)
+    if alone:
+        step(0.2)
+        moved = _mean_posteriors(poses, training.standardizer, mixture, kind, kinds.count).argmax(axis=1)
+        kind_of_samples = _kinds_of_samples([moved], meshes, training, kinds.count)
         mixture, kind = _fitted_inside(training, kind_of_samples, axes, count, covariance_type)
-        posteriors = [
-            _mean_posteriors(of_mesh, training.standardizer, mixture, kind, kinds.count) for of_mesh in meshes
-        ]
-        of_faces = [of_mesh.argmax(axis=1) for of_mesh in posteriors]
     if len(mixture.weights) < n_segments:
         raise TooFewSamplesError(n_segments, len(mixture.weights))
-    areas = [_mean_shares(of_mesh) for of_mesh in meshes]
-    overlaps = np.mean([p.T @ (p * a[:, None]) for p, a in zip(posteriors, areas, strict=True)], axis=0)
-    kinds = _with_vanished_first(kinds, of_faces, areas)
+    step(0.8)
+    posteriors = mixture.group_posteriors(training.standardized, kind, kinds.count)
+    overlaps = posteriors.T @ (posteriors * training.shares[:, None])
+    left = np.bincount(posteriors.argmax(axis=1), training.shares, kinds.count).astype(np.float64)
+    kinds = _with_vanished_first(kinds, left, [_mean_shares(of_mesh) for of_mesh in meshes])
     tree = MergeTree.of(mixture.means @ axes, mixture.weights, kind, kinds, overlaps)
     kind_of_groups = np.zeros(tree.n_kinds, dtype=np.int64)
     kind_of_groups[tree.groups(tree.n_kinds)] = kind
@@ -260,14 +258,12 @@ def _mean_shares(poses: Sequence[Workpiece]) -> FloatArray:
     return np.asarray(np.mean([mesh.face_areas / mesh.area for mesh in meshes], axis=0))
 
 
-def _with_vanished_first(kinds: Kinds, of_faces: Sequence[IntArray], areas: Sequence[FloatArray]) -> Kinds:
-    """The kinds with those merged first that have lost most of their area, given the (m,) kind of each face now."""
-
-    def sizes(kind_of_faces: Sequence[IntArray]) -> FloatArray:
-        pairs = zip(kind_of_faces, areas, strict=True)
-        return np.sum([np.bincount(kind, area, kinds.count) for kind, area in pairs], axis=0)
-
-    vanished = np.flatnonzero(sizes(of_faces) < VANISHED * sizes(kinds.of_faces))
+def _with_vanished_first(kinds: Kinds, left: FloatArray, areas: Sequence[FloatArray]) -> Kinds:
+    """The kinds with those merged first that have lost most of their area, given the (k,) share that each has now."""
+    found = np.mean(
+        [np.bincount(kind, area, kinds.count) for kind, area in zip(kinds.of_faces, areas, strict=True)], axis=0
+    )
+    vanished = np.flatnonzero(left < VANISHED * found)
     merges, likeness = kinds.merges.tolist(), kinds.likeness.tolist()
     for lost in vanished.tolist():
         at = next((i for i, pair in enumerate(merges) if lost in pair), None)
