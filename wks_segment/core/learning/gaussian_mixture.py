@@ -339,8 +339,8 @@ class Moments:
         covariances: FloatArray
         if covariance_type == "tied":
             covariances = second - (means * weights[:, None]).T @ means
-            covariances = (1 - SHRINKAGE) * (covariances + covariances.T) / 2 + floor * np.eye(dimension)
-            covariances += SHRINKAGE * np.diag(np.diag(covariances))
+            covariances = (covariances + covariances.T) / 2 + floor * np.eye(dimension)
+            covariances = (1 - SHRINKAGE) * covariances + SHRINKAGE * np.diag(np.diag(covariances))
         elif covariance_type == "full":
             covariances = (
                 second / weights[:, None, None] - means[:, :, None] * means[:, None] + floor * np.eye(dimension)

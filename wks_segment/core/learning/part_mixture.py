@@ -123,6 +123,7 @@ def learn_parts(
     count = max(COMPONENTS_OF_MESH if alone else COMPONENTS_OF_BODIES, PER_SEGMENT * n_segments)
     step = progress.part(FOUND, 1.0, "mixture")
     kind_of_samples = _kinds_of_samples(kinds.of_faces, meshes, training, kinds.count)
+    found = np.bincount(kind_of_samples, training.shares, kinds.count).astype(np.float64)
     mixture, kind = _fitted_inside(training, kind_of_samples, axes, count, covariance_type)
     if alone:
         step(0.2)
@@ -135,7 +136,7 @@ def learn_parts(
     posteriors = mixture.group_posteriors(training.standardized, kind, kinds.count)
     overlaps = posteriors.T @ (posteriors * training.shares[:, None])
     left = np.bincount(posteriors.argmax(axis=1), training.shares, kinds.count).astype(np.float64)
-    kinds = _with_vanished_first(kinds, left, [_mean_shares(of_mesh) for of_mesh in meshes])
+    kinds = _with_vanished_first(kinds, found, left)
     tree = MergeTree.of(mixture.means @ axes, mixture.weights, kind, kinds, overlaps)
     kind_of_groups = np.zeros(tree.n_kinds, dtype=np.int64)
     kind_of_groups[tree.groups(tree.n_kinds)] = kind
@@ -252,17 +253,11 @@ def _mean_posteriors(
     return total / len(poses)
 
 
-def _mean_shares(poses: Sequence[Workpiece]) -> FloatArray:
-    """(m,) share of each face in the area of a mesh, mean over its poses."""
-    meshes = [pose.surface.original for pose in poses]
-    return np.asarray(np.mean([mesh.face_areas / mesh.area for mesh in meshes], axis=0))
+def _with_vanished_first(kinds: Kinds, found: FloatArray, left: FloatArray) -> Kinds:
+    """The kinds with those merged first that have lost most of their area.
 
-
-def _with_vanished_first(kinds: Kinds, left: FloatArray, areas: Sequence[FloatArray]) -> Kinds:
-    """The kinds with those merged first that have lost most of their area, given the (k,) share that each has now."""
-    found = np.mean(
-        [np.bincount(kind, area, kinds.count) for kind, area in zip(kinds.of_faces, areas, strict=True)], axis=0
-    )
+    Given the (k,) shares of the area that the kinds had when they were found, and have now.
+    """
     vanished = np.flatnonzero(left < VANISHED * found)
     merges, likeness = kinds.merges.tolist(), kinds.likeness.tolist()
     for lost in vanished.tolist():
