@@ -224,13 +224,17 @@ class Labeler:
     ) -> FloatArray:
         """(p, n_groups) smoothed posteriors of polygons, mean over the poses."""
         if not self._keeps(max(mesh.n_polygons, *(len(pose.signature) for pose in poses))):
-            return mesh.mean(poses, self._on_faces(poses, n_groups), progress)
+            return self._symmetric(mesh, mesh.mean(poses, self._on_faces(poses, n_groups), progress))
         of_kinds = poses[0].results.get(
             ResultKey(Kind.MEAN_POSTERIORS, len(poses), of_polygons),
             (mesh, self.mixture, self.n_kept, self.length),
-            lambda: mesh.mean(poses, self._on_faces(poses, self.n_kept), progress),
+            lambda: self._symmetric(mesh, mesh.mean(poses, self._on_faces(poses, self.n_kept), progress)),
         )
         return self._merged(of_kinds, n_groups)
+
+    def _symmetric(self, mesh: PolygonMesh, posteriors: FloatArray) -> FloatArray:
+        """Posteriors of polygons, the same on both sides of a symmetric mesh; as they are without smoothing."""
+        return mesh.mirrored(posteriors) if self.length > 0 else posteriors
 
     def _on_faces(self, poses: Sequence[Workpiece], n_groups: int) -> Callable[[Workpiece], FloatArray]:
         """Function that gives the (m, n_groups) posteriors on the faces of one of the poses of a mesh."""

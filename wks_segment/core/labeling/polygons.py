@@ -99,8 +99,11 @@ class PolygonMesh:
         for i, (pose, in_pose) in enumerate(zip(poses, self._in_poses, strict=True)):
             total = total + in_pose.mean @ posteriors_on(pose)
             progress((i + 1) / len(poses))
-        means = total / np.maximum(self._times_seen, 1)[:, None]
-        return means if self._mirror is None else self._mirror.mean(means)
+        return total / np.maximum(self._times_seen, 1)[:, None]
+
+    def mirrored(self, values: FloatArray) -> FloatArray:
+        """(p, K) values of the polygons, averaged with those of their mirror images, if the mesh has any."""
+        return values if self._mirror is None else self._mirror.mean(values)
 
     def labels(
         self,
@@ -134,7 +137,9 @@ class PolygonMesh:
             if marked is not None:
                 weights = np.where(self.neighbors.among(marked), MARKED_COST * weights, weights)
             labels = cut_borders(posteriors, graph, weights, cleaning.cut, labels)
-        exact = self._mirror if self._mirror is not None and self._mirror.is_exact(self.areas) else None
+        exact = None
+        if self._mirror is not None and cleaning.cut.length > 0 and self._mirror.is_exact(self.areas):
+            exact = self._mirror
         if exact is not None:
             labels = exact.copied(labels)
         labels, neighbors = merge_small_regions(labels, graph, cleaning.min_share, cleaning.min_share_of_largest)

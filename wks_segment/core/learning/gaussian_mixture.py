@@ -36,10 +36,8 @@ MAX_ITERATIONS = 200
 EM_TOLERANCE = 1e-3
 """EM ends when the mean log-likelihood rises by less than this in one round."""
 SEEDS = range(6)
-"""Seeds of the k-means starts. They are the same in every fit, so that the result is not a matter of luck; the best of
-them are refined on all samples."""
-SAME_LIKELIHOOD = 1e-3
-"""Starts whose log-likelihoods differ by less than this fraction ended in the same mixture."""
+"""Seeds of the k-means starts. They are the same in every fit, so that the result is not a matter of luck; the best
+one is refined on all samples."""
 STARTS_SHARE = 0.3
 """Share of the time that the starts take; the rest is refining."""
 SKETCH_SIZE = 4_000
@@ -130,27 +128,10 @@ def fit_mixture(
     random_state: int | None = None,
     progress: ShareFunction | Progress | None = None,
 ) -> GaussianMixture:
-    """Fit a mixture to weighted samples: the likeliest one that `fit_mixtures` finds.
+    """Fit a mixture to weighted samples by expectation–maximization from several starts by k-means.
 
         mixture = fit_mixture(samples, np.ones(len(samples)), 3, "diag")
         labels = mixture.posteriors(samples).argmax(axis=1)
-
-    Parameters are those of `fit_mixtures`; `progress` may also be a function of the share that is done.
-    """
-    step = Progress.of_share(progress)
-    return fit_mixtures(samples, sample_weights, n_components, covariance_type, random_state, 1, step)[0]
-
-
-def fit_mixtures(
-    samples: FloatArray,
-    sample_weights: FloatArray,
-    n_components: int,
-    covariance_type: CovarianceType,
-    random_state: int | None,
-    keep: int,
-    progress: Progress,
-) -> list[GaussianMixture]:
-    """Fit mixtures to weighted samples by expectation–maximization from several starts by k-means.
 
     Parameters
     ----------
@@ -163,17 +144,10 @@ def fit_mixtures(
     covariance_type
         See `GaussianMixture`.
     random_state : int or None
-        None: six starts, the same six in every fit, on a sketch that is spread evenly over the samples. A number: one
-        start with this seed, as in the paper.
-    keep : int
-        Maximum number of mixtures to return: the likeliest starts, refined on all samples. Starts that ended in the
-        same mixture count once.
-    progress : Progress
-        Reported in every round of EM.
-
-    Returns
-    -------
-    list of GaussianMixture, the one whose start was likeliest first.
+        None: six starts, the same six in every fit, on a sketch that is spread evenly over the samples; the likeliest
+        one is refined on all samples. A number: one start with this seed, as in the paper.
+    progress
+        Called in every round of EM with the share of the work that is done.
 
     Raises
     ------
@@ -190,6 +164,7 @@ def fit_mixtures(
                 value=covariance_type,
             )
         )
+    step = Progress.of_share(progress)
     shares = sample_weights / sample_weights.sum()
     sketch, sketch_shares = samples, shares
     if len(samples) > SKETCH_SIZE:
@@ -197,20 +172,14 @@ def fit_mixtures(
         sketch_shares = np.full(SKETCH_SIZE, 1 / SKETCH_SIZE)
     floor = variance_floor(samples, shares)
     starts = []
-    for seed, step in progress.part(0.0, STARTS_SHARE).each(list(SEEDS) if random_state is None else [random_state]):
+    for seed, part in step.part(0.0, STARTS_SHARE).each(list(SEEDS) if random_state is None else [random_state]):
         responsibilities = _k_means(sketch, sketch_shares, n_components, seed)
-        starts.append(_maximize_likelihood(sketch, sketch_shares, responsibilities, covariance_type, floor, step))
-    starts.sort(key=lambda start: -start[1])
-    distinct = [
-        mixture
-        for i, (mixture, likelihood) in enumerate(starts)
-        if i == 0 or starts[i - 1][1] - likelihood > SAME_LIKELIHOOD * abs(likelihood)
-    ][:keep]
-    refined = []
-    for start, step in progress.part(STARTS_SHARE, 1.0).each(distinct):
-        mixture, _ = _maximize_likelihood(samples, shares, start.posteriors(samples), covariance_type, floor, step)
-        refined.append(_in_order(mixture))
-    return refined
+        starts.append(_maximize_likelihood(sketch, sketch_shares, responsibilities, covariance_type, floor, part))
+    start = max(starts, key=lambda found: found[1])[0]
+    refining = step.part(STARTS_SHARE, 1.0)
+    mixture, _ = _maximize_likelihood(samples, shares, start.posteriors(samples), covariance_type, floor, refining)
+    refining(1.0)
+    return _in_order(mixture)
 
 
 def _k_means(samples: FloatArray, shares: FloatArray, n_clusters: int, seed: int) -> FloatArray:

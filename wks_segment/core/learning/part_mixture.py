@@ -30,7 +30,7 @@ from .gaussian_mixture import (
     CovarianceType,
     GaussianMixture,
     TooFewSamplesError,
-    fit_mixtures,
+    fit_mixture,
     maximize,
     squares_of,
     variance_floor,
@@ -113,7 +113,7 @@ def learn_parts(
     if parameters["preset"] == "paper":
         step, seed = progress.part(0.0, 1.0, "mixture"), parameters["random_state"]
         samples, shares = training.standardized, training.shares
-        return PartMixture(fit_mixtures(samples, shares, n_segments, covariance_type, seed, 1, step)[0], None, None)
+        return PartMixture(fit_mixture(samples, shares, n_segments, covariance_type, seed, step), None, None)
     alone = len(poses) == 1 or of_one_mesh([pose.pose for pose in poses])
     meshes = [poses] if alone else [[pose] for pose in poses]
     axes = _principal_axes(training)
