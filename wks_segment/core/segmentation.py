@@ -173,7 +173,7 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
             raise ValueError("there is no pose to learn from: pass at least one mesh, better three to five")
         overall, parameters = Progress.of(progress), self._parameters()
         poses = self._all_described(meshes, overall.part(0.0, DESCRIBED), cache)
-        overall(DESCRIBED, "mixture")
+        overall(DESCRIBED, "parts")
         training = TrainingSamples.of(poses, parameters)
         learned = learn_parts(parameters, poses, training, rest, cache, overall.part(DESCRIBED, GROUPED))
         atlases = None

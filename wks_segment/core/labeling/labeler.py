@@ -204,7 +204,7 @@ class Labeler:
             if self.traits is None or self.grouping is None or self.length == 0:
                 posteriors, group = self._mean_posteriors(mesh, poses, False, n_groups, progress), np.arange(n_groups)
             else:
-                own = self._own_parts(poses)
+                own = self._own_parts(poses, progress)
                 whole, group = own.wholes(self.grouping.group_of_groups(self.grouping.n_kinds, n_groups))
                 posteriors = np.eye(len(group))[whole][own.part]
             labels, neighbors = mesh.labels(poses, posteriors, cleaning)
@@ -224,11 +224,11 @@ class Labeler:
     ) -> FloatArray:
         """(p, n_groups) smoothed posteriors of polygons, mean over the poses."""
         if not self._keeps(max(mesh.n_polygons, *(len(pose.signature) for pose in poses))):
-            return self._symmetric(mesh, mesh.mean(poses, self._on_faces(poses, n_groups), progress))
+            return self._symmetric(mesh, mesh.mean(poses, self._on_faces(poses, n_groups, progress), progress))
         of_kinds = poses[0].results.get(
             ResultKey(Kind.MEAN_POSTERIORS, len(poses), of_polygons),
             (mesh, self.mixture, self.n_kept, self.length),
-            lambda: self._symmetric(mesh, mesh.mean(poses, self._on_faces(poses, self.n_kept), progress)),
+            lambda: self._symmetric(mesh, mesh.mean(poses, self._on_faces(poses, self.n_kept, progress), progress)),
         )
         return self._merged(of_kinds, n_groups)
 
@@ -236,19 +236,21 @@ class Labeler:
         """Posteriors of polygons, the same on both sides of a symmetric mesh; as they are without smoothing."""
         return mesh.mirrored(posteriors) if self.length > 0 else posteriors
 
-    def _on_faces(self, poses: Sequence[Workpiece], n_groups: int) -> Callable[[Workpiece], FloatArray]:
+    def _on_faces(
+        self, poses: Sequence[Workpiece], n_groups: int, progress: Progress
+    ) -> Callable[[Workpiece], FloatArray]:
         """Function that gives the (m, n_groups) posteriors on the faces of one of the poses of a mesh."""
         if self.traits is None or self.length == 0:
             return lambda pose: pose.surface.to_faces(self.smoothed(pose, n_groups))
         together = poses if of_one_mesh(_pose_signatures(poses)) else None
 
         def on_faces(pose: Workpiece) -> FloatArray:
-            own = self._own_parts(together or [pose])
+            own = self._own_parts(together or [pose], progress.never_falling())
             return self._merged(own.posteriors, n_groups)[own.part]
 
         return on_faces
 
-    def _own_parts(self, poses: Sequence[Workpiece]) -> OwnParts:
+    def _own_parts(self, poses: Sequence[Workpiece], progress: Progress) -> OwnParts:
         """Parts of a mesh, in some poses, that is cut by its own shape."""
         assert self.grouping is not None
         assert self.traits is not None
@@ -262,7 +264,7 @@ class Labeler:
         return poses[0].results.get(
             ResultKey(Kind.OWN_PARTS, len(poses)),
             inputs,
-            lambda: own_parts(poses, log_likelihoods, traits, Progress()),
+            lambda: own_parts(poses, log_likelihoods, traits, progress),
         )
 
     def _keeps(self, count: int) -> bool:

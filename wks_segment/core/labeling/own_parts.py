@@ -83,8 +83,8 @@ def own_parts(
         Of the kinds.
     progress : Progress
     """
-    evidence = Evidence.of(poses, None, progress)
-    graph = PartGraph.of(evidence, np.zeros((len(evidence.areas), 1)))
+    evidence = Evidence.of(poses, None, progress.part(0.0, 0.3))
+    graph = PartGraph.of(evidence, np.zeros((len(evidence.areas), 1)), progress.part(0.3, 1.0))
     grow(graph, OWN_PARTS, NO_LIMIT)
     part = np.searchsorted(graph.regions, graph.region_of_faces())
     areas = graph.areas[graph.regions]

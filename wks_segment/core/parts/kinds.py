@@ -119,8 +119,8 @@ def find_kinds(
     progress : Progress
     """
     graphs = []
-    for (evidence, signature), _ in progress.each(list(zip(meshes, signatures, strict=True))):
-        graph = PartGraph.of(evidence, signature)
+    for (evidence, signature), step in progress.each(list(zip(meshes, signatures, strict=True))):
+        graph = PartGraph.of(evidence, signature, step)
         grow(graph, FINEST if len(meshes) == 1 else WHOLE, n_regions_of_mesh(n_segments))
         graphs.append(graph)
     if len(meshes) == 1:

@@ -16,6 +16,7 @@ from ..geometry.agglomeration import merge_in_table
 from ..geometry.creases import MOST_CONCAVE, weights_of_borders
 from ..mesh.mirror import is_exact
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
+from ..progress import Progress
 from .evidence import Evidence
 from .motion import edge_correlations, turns
 from .patches import patches_of
@@ -78,7 +79,7 @@ class PartGraph:
     likeness: FloatArray
 
     @classmethod
-    def of(cls, evidence: Evidence, signature: FloatArray) -> PartGraph:
+    def of(cls, evidence: Evidence, signature: FloatArray, progress: Progress | None = None) -> PartGraph:
         """Patches of a mesh as the first regions, given (m, d) values of the faces to be summed as signatures."""
         areas, neighbors = evidence.areas, evidence.neighbors
         patch = patches_of(evidence.centers, areas, neighbors, evidence.fine_curvature, evidence.image)
@@ -96,7 +97,7 @@ class PartGraph:
         patch_areas = np.maximum(np.bincount(patch, areas, count), TINY)
         middle = _middle_faces(patch, evidence.centers, areas)
         viewers = evidence.poses[:VIEWERS]
-        seen = np.mean([visible(pose, middle) for pose in viewers], axis=0)
+        seen = np.mean([visible(pose, middle, step) for pose, step in Progress.of(progress).each(viewers)], axis=0)
         meshes = [pose.surface.original for pose in evidence.poses]
         graph = cls(
             patch,

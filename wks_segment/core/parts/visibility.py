@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from ..geometry.creases import smooth_normals, vertex_normals
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ..poses.pose_cache import Workpiece
+from ..progress import Progress
 
 PLACES = 8
 """Number of places on a line of sight that must be inside: gaps that matter are wider than their distance."""
@@ -25,7 +26,7 @@ NEAREST_SLACK = 0.01
 """Relative error that the search for the nearest vertex may make."""
 
 
-def visible(pose: Workpiece, faces: IntArray) -> BoolArray:
+def visible(pose: Workpiece, faces: IntArray, progress: Progress | None = None) -> BoolArray:
     """(r, r) whether the centers of some faces of a pose see each other through the inside; true on the diagonal."""
     surface = pose.surface
     unit = np.sqrt(surface.original.area)
@@ -44,7 +45,7 @@ def visible(pose: Workpiece, faces: IntArray) -> BoolArray:
     open_lines = np.flatnonzero(inward)
     # From the middle outward: most lines that leave the inside do so there.
     shares = (np.arange(PLACES) + 0.5) / PLACES
-    for share in sorted(shares, key=lambda share: abs(share - 0.5)):
+    for share, _ in Progress.of(progress).each(sorted(shares, key=lambda share: abs(share - 0.5))):
         at = places[first[open_lines]] + share * lines[open_lines]
         open_lines = open_lines[_inside(tree, vertices, normals, at)]
     result = np.eye(count, dtype=bool)
