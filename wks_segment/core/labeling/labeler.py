@@ -223,6 +223,7 @@ class Labeler:
         self, mesh: PolygonMesh, poses: Sequence[Workpiece], of_polygons: bool, n_groups: int, progress: Progress
     ) -> FloatArray:
         """(p, n_groups) smoothed posteriors of polygons, mean over the poses."""
+        progress = progress.never_falling()
         if not self._keeps(max(mesh.n_polygons, *(len(pose.signature) for pose in poses))):
             return self._symmetric(mesh, mesh.mean(poses, self._on_faces(poses, n_groups, progress), progress))
         of_kinds = poses[0].results.get(
@@ -245,7 +246,7 @@ class Labeler:
         together = poses if of_one_mesh(_pose_signatures(poses)) else None
 
         def on_faces(pose: Workpiece) -> FloatArray:
-            own = self._own_parts(together or [pose], progress.never_falling())
+            own = self._own_parts(together or [pose], progress)
             return self._merged(own.posteriors, n_groups)[own.part]
 
         return on_faces
