@@ -7,7 +7,7 @@ import pytest
 from shapes import creature, icosphere
 
 from wks_segment.core import PoseSegmentation, TriangleMesh, described_alike, rank, retrieve
-from wks_segment.core.learning.gaussian_mixture import fit_mixture
+from wks_segment.core.learning.gaussian_mixture import fit_mixture, maximize, squares_of, variance_floor
 from wks_segment.core.learning.likelihood import left_out_likelihoods, likely_mean
 from wks_segment.core.model_file import ModelFileError
 from wks_segment.core.ranking import least_usual, ranking_of, spread_evenly
@@ -126,6 +126,23 @@ def test_left_out_samples_are_less_likely():
         mixture = fit_mixture(samples, shares, 3, kind, 0)
         without = left_out_likelihoods(mixture, samples, shares, group)
         assert without.mean() < mixture.log_likelihoods(samples).mean()
+
+
+def test_left_out_samples_have_the_likelihood_of_one_step_without_them():
+    generator = np.random.default_rng(0)
+    group = np.repeat(np.arange(3), [50, 100, 150])
+    samples = generator.standard_normal((300, 4)) + group[:, None]
+    shares = generator.random(300) + 0.5
+    shares /= shares.sum()
+    floor = variance_floor(samples, shares)
+    for kind in ("shared", "diag", "spherical", "tied", "full"):
+        mixture = fit_mixture(samples, shares, 3, kind, 0)
+        found = left_out_likelihoods(mixture, samples, shares, group)
+        for i in range(3):
+            others, own = samples[group != i], samples[group == i]
+            masses = mixture.posteriors(others) * shares[group != i, None]
+            without = maximize(others, squares_of(others, kind), masses / masses.sum(), kind, floor)
+            np.testing.assert_allclose(found[group == i], without.log_likelihoods(own), rtol=1e-8)
 
 
 def test_score_far_below_the_usual_is_another_class():

@@ -10,6 +10,7 @@ from wks_segment.core.learning.gaussian_mixture import (
     SHRINKAGE,
     CovarianceType,
     GaussianMixture,
+    Moments,
     maximize,
     squares_of,
     variance_floor,
@@ -144,6 +145,31 @@ def test_a_mixture_of_given_shares_is_that_of_plain_formulas(covariance_type):
     np.testing.assert_allclose(found.weights, weights)
     np.testing.assert_allclose(found.means, means, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(found.covariances, expected, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("covariance_type", TYPES)
+def test_moments_of_two_sets_of_samples_add_up(covariance_type):
+    samples, _ = drawn(300)
+    masses = np.random.default_rng(1).random((300, 3))
+    first, second = (
+        Moments.of(samples[part], squares_of(samples[part], covariance_type), masses[part], covariance_type)
+        for part in (slice(100), slice(100, None))
+    )
+    found = first.plus(second).mixture(covariance_type, 0.01)
+    whole = maximize(samples, squares_of(samples, covariance_type), masses / masses.sum(), covariance_type, 0.01)
+    for name in ("weights", "means", "covariances"):
+        np.testing.assert_allclose(getattr(found, name), getattr(whole, name), rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("covariance_type", TYPES)
+def test_a_component_without_samples_is_finite(covariance_type):
+    samples, _ = drawn(50)
+    masses = np.zeros((50, 3))
+    masses[:, :2] = 0.01
+    mixture = maximize(samples, squares_of(samples, covariance_type), masses, covariance_type, 0.01)
+    assert np.isfinite(mixture.covariances).all()
+    posteriors = mixture.posteriors(samples)
+    np.testing.assert_allclose(posteriors, [[0.5, 0.5, 0]] * 50, atol=1e-9)
 
 
 def test_the_floor_of_variances_is_a_share_of_their_mean():
