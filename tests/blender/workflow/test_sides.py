@@ -19,8 +19,9 @@ from wks_segment.blender.workflow.report import Report
 pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
 QUICK = ("--eigenpairs", 60, "--energies", 40, "--segments", 5)
-ON_SIDES = ("paw", "foot", "ear_tip")
-ALONE = ("nose", "snout", "neck", "waist", "tail_3", "tail_6")
+ON_SIDES = ("paw", "ball", "foot", "heel")
+ALONE = ("nose", "snout", "ear_tip.L", "ear_tip.R", "neck", "waist", "tail_3", "tail_6")
+"""Bones of segments in the middle: the ears are part of the head, which has no side."""
 NO_SIDES = "No segment has parts on both sides"
 NOT_IN_PAPER = "Left and right are not told apart with the method of the paper: both sides are one part"
 
@@ -109,9 +110,9 @@ def test_parts_are_sorted_by_segment():
 def test_left_matches_left_bones_and_central_parts_have_no_side(creature):
     assert OPS.learn() == {"FINISHED"}
     assert sides_are_right(creature)
-    # One segment is both: feet, and the end of the tail.
-    feet = part_ids.segments_of(labels_of(creature)[polygons_at(creature, "foot.L")])
-    assert {feet[0]} < set(labels_of(creature))
+    # Legs and tail are segments of their own.
+    places = [part_ids.segments_of(labels_of(creature)[polygons_at(creature, bone)]) for bone in ("foot.L", "tail_6")]
+    assert not set(places[0]) & set(places[1])
 
 
 def test_both_sides_are_one_part_by_default(learned, settings):
@@ -150,12 +151,13 @@ def test_left_of_an_object_without_a_rig(creature, settings, scale, left):
 
 
 def test_masked_faces_have_the_side_of_their_neighbors(creature):
-    ears = coordinates(creature.data)[:, 2] > 1.9
-    creature.vertex_groups.new(name="Hidden").add(np.flatnonzero(ears).tolist(), 1.0, "REPLACE")
+    weights = weights_of(creature)
+    paws = np.maximum(weights["paw.L"], weights["paw.R"]) > 0.5
+    creature.vertex_groups.new(name="Hidden").add(np.flatnonzero(paws).tolist(), 1.0, "REPLACE")
     mask = creature.modifiers.new("Mask", "MASK")
     mask.vertex_group, mask.invert_vertex_group = "Hidden", True
     OPS.learn()
-    hidden = np.array([ears[list(polygon.vertices)].any() for polygon in creature.data.polygons])
+    hidden = np.array([paws[list(polygon.vertices)].any() for polygon in creature.data.polygons])
     left = np.array([polygon.center.x > 0 for polygon in creature.data.polygons])
     sides = part_ids.sides_of(labels_of(creature))
     assert hidden.sum() > 40
@@ -166,8 +168,8 @@ def test_masked_faces_have_the_side_of_their_neighbors(creature):
 def test_report_counts_segments_and_parts(creature, settings, printed):
     printed()
     OPS.learn()
-    assert "5 segments in 10 parts" in settings.model_summary
-    assert "5 segments in 10 parts" in printed().out
+    assert "5 segments in 7 parts" in settings.model_summary
+    assert "5 segments in 7 parts" in printed().out
 
 
 # What has no sides
@@ -220,7 +222,7 @@ def test_colors_of_left_and_right_are_written(learned):
     labels = np.repeat(labels_of(learned), [len(polygon.vertices) for polygon in learned.data.polygons])
     expected = sided_palette()[labels // 1000, labels % 1000]
     np.testing.assert_allclose(corners, expected, atol=1 / 255)
-    assert len(np.unique(corners, axis=0)) == 10
+    assert len(np.unique(corners, axis=0)) == 7
 
 
 def test_materials_are_sorted_by_segment_and_shared():
@@ -258,7 +260,7 @@ def test_hard_groups_have_one_side(learned, settings):
     OPS.apply()
     groups, labels = ours(learned), labels_of(learned)
     assert list(groups) == [f"WKS {part_ids.default_name(part)}" for part in part_ids.unique_parts(labels)]
-    assert {"WKS Segment 1", "WKS Segment 1.L", "WKS Segment 1.R"} < set(groups)
+    assert {"WKS Segment 1", "WKS Segment 3.L", "WKS Segment 3.R"} < set(groups)
     for part in part_ids.unique_parts(labels):
         corners = [
             polygon.vertices for polygon, label in zip(learned.data.polygons, labels, strict=True) if label == part
@@ -274,7 +276,7 @@ def test_soft_weights_of_parts_sum_to_those_of_the_segment(learned, settings):
     settings.sides = "one"
     OPS.apply()
     one = ours(learned)
-    assert len(two) == len(one) + 5 == 10
+    assert len(two) == len(one) + 2 == 7
     np.testing.assert_allclose(sum(two.values()), 1, atol=1e-6)
     for name, weights in one.items():
         of_parts = [two[part] for part in two if part.removesuffix(".L").removesuffix(".R") == name]
@@ -296,7 +298,7 @@ def test_clear_restores_everything(learned, settings, groups):
     before, own = scene_snapshot(), weights_of(learned)
     settings.write_materials, settings.vertex_groups = True, groups
     OPS.apply()
-    assert len(ours(learned)) == len(learned.data.materials) == 10
+    assert len(ours(learned)) == len(learned.data.materials) == 7
     assert OPS.clear() == {"FINISHED"}
     assert not changes(before, scene_snapshot())
     assert list(weights_of(learned)) == list(own)
@@ -353,15 +355,15 @@ def test_segment_and_apply_commands_write_sides(command, file, tmp_path):
     done = command(*segment, "--sides", "two", "--materials", "--json")
     assert done.code == 0, done
     found = done.result["parts"]
-    assert (done.result["segments"], len(found), done.result["warnings"]) == (5, 10, [])
-    assert list(found.items())[:3] == [("Segment 1", 0), ("Segment 1.L", 1000), ("Segment 1.R", 2000)]
+    assert (done.result["segments"], len(found), done.result["warnings"]) == (5, 7, [])
+    assert list(found.items())[:3] == [("Segment 1", 0), ("Segment 2", 1), ("Segment 3.L", 1002)]
     obj = opened(output)
     assert sides_are_right(obj)
     assert [material.name for material in obj.data.materials] == list(found)
     assert sorted(found.values()) == np.unique(labels_of(obj)).tolist()
 
     done = command("apply", file, "--frames", 4, "--model", model, "--output", output, "--sides", "two")
-    assert "5 segments in 10 parts" in done.out
+    assert "5 segments in 7 parts" in done.out
     assert sides_are_right(opened(output))
 
     done = command(*segment, "--json")

@@ -35,6 +35,8 @@ SAME_KIND = 0.7
 mean square over the axes, with the weighted difference of the logarithms of their areas added."""
 SIZE_WEIGHT, LEAST_SIZE = 0.5, 1e-3
 """Weight of the logarithm of an area beside signatures, and what is added to the area, so that tiny parts are alike."""
+NO_REPEAT = 1e3
+"""Distance of regions that are no repeats of each other in any case."""
 WITHIN = 1e-3
 """Added to the variance inside regions, against a division by zero."""
 MIRRORED_SHARE = 0.6
@@ -161,7 +163,11 @@ def _repeats(evidence: Evidence, signature: FloatArray, graph: PartGraph) -> Int
     scaled = means / np.sqrt(variance + WITHIN)
     distance = np.sqrt(((scaled[:, None] - scaled) ** 2).mean(axis=2))
     distance += SIZE_WEIGHT * np.abs(np.subtract.outer(np.log(areas), np.log(areas)))
-    distance[_mirrored(evidence, graph)] = 0
+    mirrored = _mirrored(evidence, graph)
+    distance[mirrored] = 0
+    # A region across the mirror plane is a neck or a tail, and no repeat of another one, however alike they are.
+    central = np.diagonal(mirrored)
+    distance[central] = distance[:, central] = NO_REPEAT
     np.fill_diagonal(distance, 0)
     tree = linkage(squareform(distance, checks=False), "average")
     return np.asarray(fcluster(tree, SAME_KIND, "distance") - 1, dtype=np.int64)
