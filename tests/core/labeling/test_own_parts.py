@@ -240,9 +240,9 @@ def test_each_body_is_cut_between_its_own_parts(model):
     mesh = figure(0.5, -0.2, 2)
     workpiece = Workpiece(model.describe(mesh))
     labeler = model._labeler()
-    own = labeler._own_parts([workpiece])
+    own = labeler._own_parts([workpiece], Progress())
     check(own, mesh.n_faces, len(model.kind_traits_.mean))
-    on_faces = labeler._on_faces([workpiece], 4)(workpiece)
+    on_faces = labeler._on_faces([workpiece], 4, Progress())(workpiece)
     for part in range(len(own.posteriors)):
         assert (np.ptp(on_faces[own.part == part], axis=0) == 0).all()
     np.testing.assert_allclose(on_faces.sum(axis=1), 1)
