@@ -25,6 +25,7 @@ settings.load_profile("default")
 LONGEST = (
     "blender/cli/test_recipes.py", "blender/cli/test_command_batch.py", "batch/test_dask_cluster.py",
     "blender/workflow/test_sides.py", "core/test_segmentation.py", "core/poses/test_signature_cache.py",
+    "core/poses/test_pose_cache.py", "core/labeling/test_region_atlas.py", "core/test_ranking.py",
     "blender/workflow/test_background_job.py", "blender/outputs/test_undo_and_clear.py",
 )  # fmt: skip
 """Files that take 20 to 60 seconds of a processor. They come first, the longest one before all, so that at the end no
