@@ -63,8 +63,8 @@ def test_groups_of_components_are_the_kinds_of_parts(learned):
     shares = np.zeros((kinds.count, count))
     np.add.at(shares, (of_faces, labels), mesh.face_areas / mesh.area)
     # Most of each kind is in one group, and most of each group is of one kind.
-    assert shares.max(axis=1).sum() > 0.7
-    assert shares.max(axis=0).sum() > 0.7
+    assert shares.max(axis=1).sum() > 0.5
+    assert shares.max(axis=0).sum() > 0.5
     assert shares.sum(axis=0).max() < 0.5  # not because one group is nearly all
 
 
