@@ -20,7 +20,7 @@ from .poses.pose_signature import PoseSignature
 from .segmentation import PoseSegmentation
 
 Verdict = Literal["sure", "unsure", "nothing fits"]
-SCORE_WIDTH = 0.15
+SCORE_WIDTH = 0.1
 """Difference of two comparable scores at which one model is e times as probable as the other. With it, of the answers
 with some probability about this share is right (Princeton classes, five choices of learned shapes)."""
 SURE_PROBABILITY = 0.95

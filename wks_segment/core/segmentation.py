@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
+from dataclasses import replace
 from os import PathLike
 from typing import Any, Literal
 
@@ -36,6 +37,10 @@ from .user_labels import PartNotes
 
 DESCRIBED, GROUPED = 0.2, 0.8
 """Shares of the time of a fit after which the poses are described, and the parts are found and merged."""
+
+
+MERGING_ROUNDS = 6
+"""Most times that regions are found, each time without a segment that was found nowhere."""
 
 
 class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # scikit-learn has no types
@@ -178,8 +183,7 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
         learned = learn_parts(parameters, poses, training, rest, cache, overall.part(DESCRIBED, GROUPED))
         atlases = None
         if learned.grouping is not None:
-            labeler = self._labeler_of(learned.mixture, training.standardizer, learned.grouping, learned.traits)
-            atlases = labeler.atlases(poses, rest, overall.part(GROUPED, 1.0, "regions"))
+            learned, atlases = self._recognized(learned, training.standardizer, poses, rest, overall.part(GROUPED, 1.0))
         self._set_learned(learned, training.standardizer, atlases, usual_scores(learned.mixture, training))
         self.part_notes_ = PartNotes()
         overall(1.0, "done")
@@ -322,6 +326,29 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
         self.grouping_, self.kind_traits_ = learned.grouping, learned.traits
         self.regions_, self.sides_ = atlases or (None, None)
         self.usual_scores_ = scores
+
+    def _recognized(
+        self,
+        learned: PartMixture,
+        standardizer: Standardizer,
+        poses: Sequence[Workpiece],
+        rest: TriangleMesh | None,
+        progress: Progress,
+    ) -> tuple[PartMixture, tuple[RegionAtlas, RegionAtlas]]:
+        """Atlases of the regions of the learned poses, and the merge tree without segments that are found nowhere.
+
+        A small kind of part may be lost when borders are smoothed: then it is merged, and another part split.
+        """
+        assert learned.grouping is not None
+        for round_ in range(MERGING_ROUNDS):
+            labeler = self._labeler_of(learned.mixture, standardizer, learned.grouping, learned.traits)
+            step = progress.part(round_ / MERGING_ROUNDS, (round_ + 1) / MERGING_ROUNDS, "regions")
+            atlases = labeler.atlases(poses, rest, step)
+            lost = sorted(set(range(labeler.n_segments)) - set(atlases[1].traits.segment.tolist()))
+            if not lost or learned.traits is not None:
+                break
+            learned = replace(learned, grouping=learned.grouping.without(lost[-1], labeler.n_segments))
+        return learned, atlases
 
     def _parameters(self) -> dict[str, Any]:
         return {name: getattr(self, name) for name in PARAMETERS}

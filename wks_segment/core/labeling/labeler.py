@@ -92,11 +92,11 @@ class Labeler:
         if not self._keeps(len(pose.signature)):
             return self._smooth(pose, self._raw(pose, n_groups))
         raw = pose.results.get(
-            ResultKey(Kind.POSTERIORS), (self.mixture, self.n_kept), lambda: self._raw(pose, self.n_kept)
+            ResultKey(Kind.POSTERIORS), (self.mixture, self.grouping, self.n_kept), lambda: self._raw(pose, self.n_kept)
         )
         smooth = pose.results.get(
             ResultKey(Kind.SMOOTH_POSTERIORS),
-            (self.mixture, self.n_kept, self.length),
+            (self.mixture, self.grouping, self.n_kept, self.length),
             lambda: self._smooth(pose, raw),
         )
         return self._merged(smooth, n_groups)
@@ -228,7 +228,7 @@ class Labeler:
             return self._symmetric(mesh, mesh.mean(poses, self._on_faces(poses, n_groups, progress), progress))
         of_kinds = poses[0].results.get(
             ResultKey(Kind.MEAN_POSTERIORS, len(poses), of_polygons),
-            (mesh, self.mixture, self.n_kept, self.length),
+            (mesh, self.mixture, self.grouping, self.n_kept, self.length),
             lambda: self._symmetric(mesh, mesh.mean(poses, self._on_faces(poses, self.n_kept, progress), progress)),
         )
         return self._merged(of_kinds, n_groups)

@@ -8,7 +8,7 @@ number of components, needs no learning.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.cluster.hierarchy import linkage
@@ -113,6 +113,25 @@ class MergeTree:
         owner = np.zeros(fine, dtype=np.int64)
         owner[self.groups(fine)] = self.groups(coarse)
         return owner
+
+    def without(self, group: int, n_groups: int) -> MergeTree:
+        """The tree in which one of `n_groups` groups, not the first, is merged already, and another one split instead.
+
+        For a group that is found nowhere; the tree itself if there is nothing left to split.
+        """
+        count = len(self.certainties)
+        if group == 0 or n_groups >= count:
+            return self
+        pairs, odds = self.pairs.tolist(), self.likeness[:0:-1].tolist()
+        kept, gone = pairs.pop(count - 1 - group)
+        likeness = odds.pop(count - 1 - group)
+        # Just before the last merge that `n_groups` groups need; what the group would have taken goes where it goes.
+        at = count - n_groups - 1
+        pairs[at:] = [[kept if name == gone else name for name in pair] for pair in pairs[at:]]
+        pairs.insert(at, [kept, gone])
+        odds.insert(at, likeness)
+        likeness_by_number = np.append(self.likeness[0], odds[::-1])
+        return replace(self, pairs=np.array(pairs, dtype=np.int64), likeness=likeness_by_number)
 
     def curve(self) -> FloatArray:
         """(K,) certainty with 1, 2, … K groups beyond chance: 1 if all faces are certain, 0 if only sizes are known.

@@ -52,7 +52,7 @@ more, poses and bodies that were not learned are recognized worse, with fewer, p
 (docs/dev/experiments.md)."""
 SMOOTHING_LENGTH = 0.03
 """Width of the smoothing along borders at smoothness 1, in units of the square root of the area."""
-VANISHED = 0.25
+VANISHED = 0.5
 """A kind that keeps less than this share of its area when borders move is merged before all others."""
 FOUND = 0.7
 """Share of the time of learning after which the kinds are found."""
@@ -123,20 +123,20 @@ def learn_parts(
     count = max(COMPONENTS_OF_MESH if alone else COMPONENTS_OF_BODIES, PER_SEGMENT * n_segments)
     step = progress.part(FOUND, 1.0, "mixture")
     kind_of_samples = _kinds_of_samples(kinds.of_faces, meshes, training, kinds.count)
-    found = np.bincount(kind_of_samples, training.shares, kinds.count).astype(np.float64)
+    found = after = np.bincount(kind_of_samples, training.shares, kinds.count).astype(np.float64)
     mixture, kind = _fitted_inside(training, kind_of_samples, axes, count, covariance_type)
     if alone:
         step(0.2)
         moved = _mean_posteriors(poses, training.standardizer, mixture, kind, kinds.count).argmax(axis=1)
         kind_of_samples = _kinds_of_samples([moved], meshes, training, kinds.count)
+        after = np.bincount(kind_of_samples, training.shares, kinds.count).astype(np.float64)
         mixture, kind = _fitted_inside(training, kind_of_samples, axes, count, covariance_type)
     if len(mixture.weights) < n_segments:
         raise TooFewSamplesError(n_segments, len(mixture.weights))
     step(0.8)
     posteriors = mixture.group_posteriors(training.standardized, kind, kinds.count)
     overlaps = posteriors.T @ (posteriors * training.shares[:, None])
-    left = np.bincount(posteriors.argmax(axis=1), training.shares, kinds.count).astype(np.float64)
-    kinds = _with_vanished_first(kinds, found, left)
+    kinds = _with_vanished_first(kinds, found, after)
     tree = MergeTree.of(mixture.means @ axes, mixture.weights, kind, kinds, overlaps)
     kind_of_groups = np.zeros(tree.n_kinds, dtype=np.int64)
     kind_of_groups[tree.groups(tree.n_kinds)] = kind
@@ -260,14 +260,16 @@ def _with_vanished_first(kinds: Kinds, found: FloatArray, left: FloatArray) -> K
     """
     vanished = np.flatnonzero(left < VANISHED * found)
     merges, likeness = kinds.merges.tolist(), kinds.likeness.tolist()
+    done = 0
     for lost in vanished.tolist():
-        at = next((i for i, pair in enumerate(merges) if lost in pair), None)
-        if at is None:
+        at = next((i for i in range(done, len(merges)) if lost in merges[i]), None)
+        if at is None:  # another kind that vanished has taken it
             continue
         kept, gone = merges.pop(at)
         other = kept if lost == gone else gone
         if lost == kept:
             merges = [[other if one == lost else one for one in pair] for pair in merges]
-        merges.insert(0, [other, lost])
-        likeness.insert(0, likeness.pop(at))
+        merges.insert(done, [other, lost])
+        likeness.insert(done, likeness.pop(at))
+        done += 1
     return replace(kinds, merges=np.array(merges, dtype=np.int64).reshape(-1, 2), likeness=np.array(likeness))
