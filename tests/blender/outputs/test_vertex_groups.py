@@ -143,7 +143,8 @@ def test_each_object_of_a_character_gets_its_own_weights(settings, with_modifier
     assert "1 pose" in settings.model_summary, "they are not one character"
     for obj in (body, child):
         hard = weights_of(obj)
-        assert set(np.unique(hard)) == {0, 1}
+        # An object may be one segment as a whole.
+        assert set(np.unique(hard)) <= {0, 1}
         assert hard.any(axis=1).all()
     learned(settings, "soft", body, child)
     for obj in (body, child):

@@ -18,7 +18,7 @@ from wks_segment.blender.workflow.report import Report
 
 pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
-QUICK = ("--eigenpairs", 60, "--energies", 40, "--segments", 5)
+QUICK = ("--eigenpairs", 60, "--energies", 40, "--segments", 6)
 ON_SIDES = ("paw", "ball", "foot", "heel")
 ALONE = ("nose", "snout", "ear_tip.L", "ear_tip.R", "neck", "waist", "tail_3", "tail_6")
 """Bones of segments in the middle: the ears are part of the head, which has no side."""
@@ -32,7 +32,7 @@ def creature(settings, monkeypatch):
     monkeypatch.setattr(builder, "SUBDIVISIONS", 1)
     obj = builder.build_creature(bpy.context.scene)
     settings.source, settings.pose_count, settings.sides = "FRAMES", 4, "two"
-    settings.n_segments, settings.n_eigenpairs, settings.n_energies = 5, 60, 40
+    settings.n_segments, settings.n_eigenpairs, settings.n_energies = 6, 60, 40
     select(obj)
     return obj
 
@@ -120,7 +120,7 @@ def test_both_sides_are_one_part_by_default(learned, settings):
     settings.property_unset("sides")
     OPS.apply()
     np.testing.assert_array_equal(labels_of(learned), part_ids.segments_of(sided))
-    assert sided.max() > labels_of(learned).max() == 4
+    assert sided.max() > labels_of(learned).max() == 5
 
 
 def test_left_is_told_at_rest_for_turned_characters(creature):
@@ -168,8 +168,8 @@ def test_masked_faces_have_the_side_of_their_neighbors(creature):
 def test_report_counts_segments_and_parts(creature, settings, printed):
     printed()
     OPS.learn()
-    assert "5 segments in 7 parts" in settings.model_summary
-    assert "5 segments in 7 parts" in printed().out
+    assert "6 segments in 8 parts" in settings.model_summary
+    assert "6 segments in 8 parts" in printed().out
 
 
 # What has no sides
@@ -190,7 +190,7 @@ def test_paper_method_has_no_sides_and_warns(creature, settings, printed):
     printed()
     assert OPS.learn() == {"FINISHED"}
     assert f"Warning: {NOT_IN_PAPER}" in printed().out
-    assert labels_of(creature).max() < 5
+    assert labels_of(creature).max() < 6
 
 
 # Apply to Selected
@@ -222,7 +222,7 @@ def test_colors_of_left_and_right_are_written(learned):
     labels = np.repeat(labels_of(learned), [len(polygon.vertices) for polygon in learned.data.polygons])
     expected = sided_palette()[labels // 1000, labels % 1000]
     np.testing.assert_allclose(corners, expected, atol=1 / 255)
-    assert len(np.unique(corners, axis=0)) == 7
+    assert len(np.unique(corners, axis=0)) == 8
 
 
 def test_materials_are_sorted_by_segment_and_shared():
@@ -276,7 +276,7 @@ def test_soft_weights_of_parts_sum_to_those_of_the_segment(learned, settings):
     settings.sides = "one"
     OPS.apply()
     one = ours(learned)
-    assert len(two) == len(one) + 2 == 7
+    assert len(two) == len(one) + 2 == 8
     np.testing.assert_allclose(sum(two.values()), 1, atol=1e-6)
     for name, weights in one.items():
         of_parts = [two[part] for part in two if part.removesuffix(".L").removesuffix(".R") == name]
@@ -298,7 +298,7 @@ def test_clear_restores_everything(learned, settings, groups):
     before, own = scene_snapshot(), weights_of(learned)
     settings.write_materials, settings.vertex_groups = True, groups
     OPS.apply()
-    assert len(ours(learned)) == len(learned.data.materials) == 7
+    assert len(ours(learned)) == len(learned.data.materials) == 8
     assert OPS.clear() == {"FINISHED"}
     assert not changes(before, scene_snapshot())
     assert list(weights_of(learned)) == list(own)
@@ -323,7 +323,7 @@ def test_undo_restores_everything(learned):
 def test_demo_measures_sides(creature, settings, tmp_path, needs_rendering):
     demo = demo_scene.Demo(Character((creature,)), tmp_path / "walk", 4, 1)
     result = demo.run(bpy.context, settings, Run(Report([])))
-    assert (result["segments"], len(result["parts"])) == (5, len(np.unique(labels_of(creature))))
+    assert (result["segments"], len(result["parts"])) == (6, len(np.unique(labels_of(creature))))
     assert result["agreement"] > 0.8
     assert sides_are_right(creature)
 
@@ -355,7 +355,7 @@ def test_segment_and_apply_commands_write_sides(command, file, tmp_path):
     done = command(*segment, "--sides", "two", "--materials", "--json")
     assert done.code == 0, done
     found = done.result["parts"]
-    assert (done.result["segments"], len(found), done.result["warnings"]) == (5, 7, [])
+    assert (done.result["segments"], len(found), done.result["warnings"]) == (6, 8, [])
     assert list(found.items())[:3] == [("Segment 1", 0), ("Segment 2", 1), ("Segment 3.L", 1002)]
     obj = opened(output)
     assert sides_are_right(obj)
@@ -363,11 +363,11 @@ def test_segment_and_apply_commands_write_sides(command, file, tmp_path):
     assert sorted(found.values()) == np.unique(labels_of(obj)).tolist()
 
     done = command("apply", file, "--frames", 4, "--model", model, "--output", output, "--sides", "two")
-    assert "5 segments in 7 parts" in done.out
+    assert "6 segments in 8 parts" in done.out
     assert sides_are_right(opened(output))
 
     done = command(*segment, "--json")
-    assert list(done.result["parts"].values()) == [0, 1, 2, 3, 4], "the file's own setting was taken"
+    assert list(done.result["parts"].values()) == [0, 1, 2, 3, 4, 5], "the file's own setting was taken"
 
 
 def test_command_warns_of_the_paper_method(command, file, tmp_path):

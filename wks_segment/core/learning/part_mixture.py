@@ -46,8 +46,9 @@ AXES, WHITENING, LEAST_VARIANCE = 20, 0.25, 1e-2
 """Number of principal axes of the signatures along which parts are compared, and the power of their variance, with a
 little added, that they are divided by: later axes, which tell small parts apart, then count more, but less than the
 first ones."""
-COMPONENTS_OF_MESH, COMPONENTS_OF_BODIES, PER_SEGMENT = 100, 60, 2
-"""Number of components of the mixture of one mesh, and of several; the last for each segment if that is more. With
+COMPONENTS_OF_MESH, COMPONENTS_OF_POSE, COMPONENTS_OF_BODIES, PER_SEGMENT = 100, 30, 60, 2
+"""Number of components of the mixture of one mesh, but at most so many for each of its poses; of the mixture of several
+meshes; and the least number for each segment. With
 more, poses and bodies that were not learned are recognized worse, with fewer, parts are not kept
 (docs/dev/experiments.md)."""
 SMOOTHING_LENGTH = 0.03
@@ -120,7 +121,8 @@ def learn_parts(
     kinds = _kinds_of(meshes, training.standardizer, axes, n_segments, rest, cache, progress.part(0.0, FOUND, "parts"))
     if covariance_type == "auto":
         covariance_type = "tied" if alone else "shared"
-    count = max(COMPONENTS_OF_MESH if alone else COMPONENTS_OF_BODIES, PER_SEGMENT * n_segments)
+    usual = min(COMPONENTS_OF_MESH, COMPONENTS_OF_POSE * len(poses)) if alone else COMPONENTS_OF_BODIES
+    count = max(usual, PER_SEGMENT * n_segments)
     step = progress.part(FOUND, 1.0, "mixture")
     kind_of_samples = _kinds_of_samples(kinds.of_faces, meshes, training, kinds.count)
     found = after = np.bincount(kind_of_samples, training.shares, kinds.count).astype(np.float64)

@@ -150,7 +150,7 @@ def grow(graph: PartGraph, least: float, most_regions: int) -> None:
                 return
             first = int(small[graph.areas[small].argmin()])
             second = int(graph.likeness[first].argmax())
-        graph.merge(first, second)
+        graph.merge_both(first, second, least)
 
 
 def _repeats(evidence: Evidence, signature: FloatArray, graph: PartGraph) -> IntArray:

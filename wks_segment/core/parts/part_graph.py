@@ -63,6 +63,8 @@ class PartGraph:
         Sums over pairs of patches: product of the areas of those that see each other.
     likeness : (n, n) array
         Log-odds that two neighbors are one part; −inf for regions that do not touch.
+    mirrored : (n,) int array or None
+        Mirror image of each patch; None if the mesh is not its own mirror image.
     """
 
     patch: IntArray
@@ -77,6 +79,7 @@ class PartGraph:
     concavities: FloatArray
     sights: FloatArray
     likeness: FloatArray
+    mirrored: IntArray | None = None
 
     @classmethod
     def of(cls, evidence: Evidence, signature: FloatArray, progress: Progress | None = None) -> PartGraph:
@@ -113,9 +116,9 @@ class PartGraph:
             seen * np.outer(patch_areas, patch_areas),
             np.full((count, count), -np.inf),
         )
-        mirrored = _mirrored_patches(patch, evidence)
-        if mirrored is not None:
-            graph._share_evidence(mirrored)
+        graph.mirrored = _mirrored_patches(patch, evidence)
+        if graph.mirrored is not None:
+            graph._share_evidence(graph.mirrored)
         touching = np.nonzero(np.triu(graph.lengths > 0, 1))
         graph._measure(*touching)
         return graph
@@ -156,6 +159,21 @@ class PartGraph:
         around = np.flatnonzero((self.lengths[kept] > 0) & self.alive)
         self._measure(np.full(len(around), kept), around)
         return kept
+
+    def merge_both(self, first: int, second: int, least: float) -> None:
+        """Merge two regions, and their mirror images: which of two equal pairs comes first must not decide.
+
+        Mirror images of which one has been merged already are merged if their log-odds are not below `least`.
+        """
+        images = None
+        if self.mirrored is not None:
+            images = self.owner[self.mirrored[first]], self.owner[self.mirrored[second]]
+        self.merge(first, second)
+        if images is not None:
+            apart = not {first, second} & set(map(int, images))
+            one, other = (int(self.owner[image]) for image in images)
+            if one != other and self.likeness[one, other] >= (-np.finfo(float).max if apart else least):
+                self.merge(one, other)
 
     def _share_evidence(self, mirrored: IntArray) -> None:
         """Give mirrored regions the same evidence, given the (n,) mirror image of each patch."""
