@@ -69,7 +69,7 @@ def test_corners_decide_whether_vertices_are_known_not_the_kind_of_modifier():
 )
 def test_soft_weights_through_modifiers_that_make_faces(settings, kind, options):
     obj = modified(kind, **options)
-    settings.n_segments = 3
+    settings.n_segments = 2
     learned(settings, "soft", obj)
     weights = weights_of(obj)
     np.testing.assert_allclose(weights.sum(axis=1), 1, atol=1e-6)

@@ -46,7 +46,7 @@ AXES, WHITENING, LEAST_VARIANCE = 20, 0.25, 1e-2
 """Number of principal axes of the signatures along which parts are compared, and the power of their variance, with a
 little added, that they are divided by: later axes, which tell small parts apart, then count more, but less than the
 first ones."""
-COMPONENTS_OF_MESH, COMPONENTS_OF_POSE, COMPONENTS_OF_BODIES, PER_SEGMENT = 100, 30, 60, 2
+COMPONENTS_OF_MESH, COMPONENTS_OF_POSE, COMPONENTS_OF_BODIES, PER_SEGMENT = 100, 40, 60, 2
 """Number of components of the mixture of one mesh, but at most so many for each of its poses; of the mixture of several
 meshes; and the least number for each segment. With
 more, poses and bodies that were not learned are recognized worse, with fewer, parts are not kept
