@@ -11,9 +11,12 @@ from scipy.spatial import cKDTree
 
 from .triangle_mesh import FloatArray, IntArray, TriangleMesh
 
-TOLERANCE, FACE_TOLERANCE = 0.003, 0.3
+TOLERANCE, FACE_TOLERANCE, HALF_TOLERANCE = 0.003, 0.3, 0.35
 """A face is the mirror image of another if its center is off by less than `TOLERANCE` of the size of the mesh plus
-`FACE_TOLERANCE` times the root of its area: a quad may be cut along the other diagonal."""
+`FACE_TOLERANCE` times the root of its area; if it has no mutually nearest one, plus `HALF_TOLERANCE` times its longest
+edge: a square may be cut along the other diagonal, which moves the centers of its halves by a third of a side."""
+NEAR_FACES = 6
+"""Number of nearest faces among which such a face looks for its mirror image."""
 LEAST_SHARE = 0.5
 """Least share of the area that must have a mirror image: below, likeness is a coincidence."""
 EXACT_SHARE = 0.999
@@ -105,19 +108,28 @@ def _mirror(mesh: TriangleMesh) -> Mirror | None:
     corners = mesh.vertices[np.unique(mesh.faces)]
     low, high = corners.min(axis=0), corners.max(axis=0)
     tolerance = TOLERANCE * float((high - low).max()) + FACE_TOLERANCE * np.sqrt(areas)
-    tree = cKDTree(centers)
-    best, best_share, best_side = None, LEAST_SHARE, np.zeros(0)
+    points = mesh.vertices[mesh.faces]
+    longest = np.linalg.norm(points - np.roll(points, 1, axis=1), axis=2).max(axis=1)
+    of_halves = TOLERANCE * float((high - low).max()) + HALF_TOLERANCE * longest
+    # A face and its mirror image are of one size, so that a large one is not taken for small ones beside its image.
+    places = np.column_stack([centers, np.sqrt(areas)])
+    tree = cKDTree(places)
+    best, best_share = None, LEAST_SHARE
     for axis in range(3):
         middle = (low[axis] + high[axis]) / 2
         if np.average(np.abs(centers[:, axis] - middle), weights=areas) < OUTSIDE_PLANE * np.sqrt(mesh.area):
             continue
-        images = centers.copy()
+        images = places.copy()
         images[:, axis] = 2 * middle - images[:, axis]
         image = _mutual(tree, images, tolerance)
         share = float(areas[image >= 0].sum() / areas.sum())
         if share > best_share + 1e-6:
-            best, best_share, best_side = image, share, centers[:, axis] - middle
-    return None if best is None else Mirror(best, np.sign(np.round(best_side, 12)).astype(np.int64))
+            best, best_share = (image, images, centers[:, axis] - middle), share
+    if best is None:
+        return None
+    image, images, offset = best
+    side = np.sign(np.round(offset, 12)).astype(np.int64)
+    return Mirror(_with_halves(image, tree, images, of_halves), side)
 
 
 def is_exact(image: IntArray | None, areas: FloatArray) -> bool:
@@ -132,3 +144,21 @@ def _mutual(tree: cKDTree, images: FloatArray, tolerance: FloatArray) -> IntArra
     near = distance < tolerance
     mutual = near & near[nearest] & (nearest[nearest] == own)
     return np.where(mutual, nearest, -1)
+
+
+def _with_halves(image: IntArray, tree: cKDTree, images: FloatArray, tolerance: FloatArray) -> IntArray:
+    """(m,) images with those of faces that have none yet, nearest pairs first.
+
+    The two halves of a square that is cut along the other diagonal are equally near: each takes what the other has
+    left.
+    """
+    result, left = image.copy(), np.flatnonzero(image < 0)
+    if not len(left):
+        return result
+    distances, candidates = tree.query(images[left], k=min(NEAR_FACES, len(images)))
+    first, column = np.nonzero(distances < tolerance[left, None])
+    for i in np.argsort(distances[first, column], kind="stable"):
+        one, other = int(left[first[i]]), int(candidates[first[i], column[i]])
+        if result[one] < 0 and result[other] < 0:
+            result[one], result[other] = other, one
+    return result
