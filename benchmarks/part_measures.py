@@ -84,8 +84,8 @@ def mirror_images(mesh: TriangleMesh, axis: int) -> IntArray | None:
     """(m,) the face that each face is mirrored to, in the plane through the center across an axis.
 
     None if a vertex has no mirror image, or each face is its own. Squares may be cut another way on the other side:
-    then the mirror image is the face whose center is nearest to where it should be. Of two at one place, as of thin
-    cloth, it is the one that faces the right way.
+    then the mirror image is the face of its size whose center is nearest to where it should be. Of two at one place, as
+    of thin cloth, it is the one that faces the right way.
     """
     a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
     normals = np.cross(b - a, c - a)
@@ -97,8 +97,9 @@ def mirror_images(mesh: TriangleMesh, axis: int) -> IntArray | None:
     points, centers = ((p - (low + high) / 2) / size for p in (points, mesh.face_centers))
     if (cKDTree(points).query(points * flip)[0] > MIRRORED).any():
         return None
-    faces = np.concatenate([centers, FACING * normals], axis=1)
-    images = cKDTree(faces).query(faces * np.tile(flip, 2))[1]
+    # Half of a large square is not mirrored to a small face beside its image.
+    faces = np.concatenate([centers, FACING * normals, np.sqrt(mesh.face_areas)[:, None] / size], axis=1)
+    images = cKDTree(faces).query(faces * np.append(np.tile(flip, 2), 1))[1]
     return None if (images == np.arange(len(images))).all() else np.asarray(images)
 
 
