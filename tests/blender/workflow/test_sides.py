@@ -152,12 +152,12 @@ def test_left_of_an_object_without_a_rig(creature, settings, scale, left):
 
 def test_masked_faces_have_the_side_of_their_neighbors(creature):
     weights = weights_of(creature)
-    feet = np.maximum(weights["foot.L"], weights["foot.R"]) > 0.5
-    creature.vertex_groups.new(name="Hidden").add(np.flatnonzero(feet).tolist(), 1.0, "REPLACE")
+    paws = np.maximum(weights["paw.L"], weights["paw.R"]) > 0.5
+    creature.vertex_groups.new(name="Hidden").add(np.flatnonzero(paws).tolist(), 1.0, "REPLACE")
     mask = creature.modifiers.new("Mask", "MASK")
     mask.vertex_group, mask.invert_vertex_group = "Hidden", True
     OPS.learn()
-    hidden = np.array([feet[list(polygon.vertices)].any() for polygon in creature.data.polygons])
+    hidden = np.array([paws[list(polygon.vertices)].any() for polygon in creature.data.polygons])
     left = np.array([polygon.center.x > 0 for polygon in creature.data.polygons])
     sides = part_ids.sides_of(labels_of(creature))
     assert hidden.sum() > 40
