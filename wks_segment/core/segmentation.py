@@ -345,8 +345,8 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
             step = progress.part(round_ / MERGING_ROUNDS, (round_ + 1) / MERGING_ROUNDS, "regions")
             atlases = labeler.atlases(poses, rest, step)
             lost = sorted(set(range(labeler.n_segments)) - set(atlases[1].traits.segment.tolist()))
-            if not lost or learned.traits is not None:
-                break
+            if not lost or learned.traits is not None or round_ == MERGING_ROUNDS - 1:
+                break  # the tree that is returned is the one that the atlases are of
             learned = replace(learned, grouping=learned.grouping.without(lost[-1], labeler.n_segments))
         return learned, atlases
 

@@ -17,6 +17,8 @@ TOLERANCE, FACE_TOLERANCE, HALF_TOLERANCE = 0.003, 0.3, 0.35
 edge: a square may be cut along the other diagonal, which moves the centers of its halves by a third of a side."""
 NEAR_FACES = 6
 """Number of nearest faces among which such a face looks for its mirror image."""
+SAMPLED_FACES = 4_000
+"""Number of faces by which a plane is ruled out: if less than half of `LEAST_SHARE` of them have an image there."""
 LEAST_SHARE = 0.5
 """Least share of the area that must have a mirror image: below, likeness is a coincidence."""
 EXACT_SHARE = 0.999
@@ -121,6 +123,10 @@ def _mirror(mesh: TriangleMesh) -> Mirror | None:
             continue
         images = places.copy()
         images[:, axis] = 2 * middle - images[:, axis]
+        some = slice(None, None, max(1, len(places) // SAMPLED_FACES))
+        near = _nearest(tree, images[some], tolerance)[0] < tolerance[some]
+        if areas[some][near].sum() < LEAST_SHARE / 2 * areas[some].sum():
+            continue
         image = _mutual(tree, images, tolerance)
         share = float(areas[image >= 0].sum() / areas.sum())
         if share > best_share + 1e-6:
@@ -137,9 +143,16 @@ def is_exact(image: IntArray | None, areas: FloatArray) -> bool:
     return image is not None and bool(areas[image >= 0].sum() >= EXACT_SHARE * areas.sum())
 
 
+def _nearest(tree: cKDTree, images: FloatArray, tolerance: FloatArray) -> tuple[FloatArray, IntArray]:
+    """(k,) distance of the face nearest to each image, and the face; infinite and 0 if it is too far to matter."""
+    # Without a bound, a search far from all faces looks at most of them.
+    distance, nearest = tree.query(images, distance_upper_bound=float(tolerance.max()))
+    return distance, np.where(np.isfinite(distance), nearest, 0)
+
+
 def _mutual(tree: cKDTree, images: FloatArray, tolerance: FloatArray) -> IntArray:
     """(m,) face at the place of each image that in turn has this face as its image; −1 for none."""
-    distance, nearest = tree.query(images)
+    distance, nearest = _nearest(tree, images, tolerance)
     own = np.arange(len(images))
     near = distance < tolerance
     mutual = near & near[nearest] & (nearest[nearest] == own)
@@ -155,7 +168,9 @@ def _with_halves(image: IntArray, tree: cKDTree, images: FloatArray, tolerance: 
     result, left = image.copy(), np.flatnonzero(image < 0)
     if not len(left):
         return result
-    distances, candidates = tree.query(images[left], k=min(NEAR_FACES, len(images)))
+    distances, candidates = tree.query(
+        images[left], k=range(1, min(NEAR_FACES, len(images)) + 1), distance_upper_bound=float(tolerance.max())
+    )
     first, column = np.nonzero(distances < tolerance[left, None])
     for i in np.argsort(distances[first, column], kind="stable"):
         one, other = int(left[first[i]]), int(candidates[first[i], column[i]])
