@@ -6,7 +6,7 @@ from shapes import figure
 
 from wks_segment.core import PoseSegmentation, TriangleMesh
 
-SMALL = {"n_segments": 4, "n_eigenpairs": 120, "n_energies": 60}
+SMALL = {"n_segments": 4, "n_eigenpairs": 200, "n_energies": 100}
 BENDS = ((0.0, 0.0), (0.5, 0.1), (-0.3, 0.6))
 UNSEEN = (0.25, 0.25)
 

@@ -123,6 +123,7 @@ def test_the_shares_of_regions_at_a_vertex_are_those_of_the_area_around_it():
 def test_a_vertex_without_a_region_around_it_has_no_shares():
     mesh = icosphere(1)
     upper = mesh.face_centers[:, 2] > 0
-    shares = shares_at_vertices(prepare_surface(mesh), np.where(upper, 0, -1), 1)
+    surface = prepare_surface(mesh)
+    shares = surface.to_vertices(shares_at_vertices(surface, np.where(upper, 0, -1), 1))
     inside = np.isin(np.arange(mesh.n_vertices), mesh.faces[upper])
     np.testing.assert_array_equal(shares[:, 0], inside)

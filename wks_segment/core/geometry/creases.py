@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..mesh.adjacency import FaceAdjacency
+from ..mesh.canonical import Frame
 from ..mesh.surface import Surface, indicator
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray, connected_groups, unique_edges
 from ..progress import Progress
@@ -109,9 +110,11 @@ def log_thickness(surface: Surface, normals: FloatArray, flows: Flows, progress:
     """
     progress = Progress.of(progress)
     mesh = surface.mesh
-    places = mesh.vertices / np.sqrt(mesh.area)
+    # The search is approximate along the axes; in the frame of the shape it ends alike for a turned mesh.
+    frame = Frame.of(mesh)
+    places = frame.places(mesh.vertices) / np.sqrt(mesh.area)
     stride = max(1, len(places) // MOST_BALLS)
-    points, directions = places[::stride], normals[::stride]
+    points, directions = places[::stride], frame.directions(normals[::stride])
     spacing = np.sqrt(2.3 / len(points))
     tree = cKDTree(points)
     radius = np.full(len(points), LARGEST_RADIUS)

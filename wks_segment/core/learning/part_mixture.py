@@ -17,7 +17,7 @@ from sklearn.cluster import KMeans
 from sklearn.exceptions import ConvergenceWarning
 
 from ..mesh.surface import shares_at_vertices
-from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
+from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray, TriangleMesh
 from ..message import Message, message_of
 from ..parts.evidence import Evidence
 from ..parts.kind_traits import KindTraits
@@ -40,7 +40,7 @@ from .parameters import effective, least_segments
 from .standardizer import Standardizer
 from .training_samples import TrainingSamples
 
-KINDS_VERSION = 1
+KINDS_VERSION = 2
 """To be raised whenever the same poses and settings give other kinds than before."""
 AXES, WHITENING, LEAST_VARIANCE = 20, 0.25, 1e-2
 """Number of principal axes of the signatures along which parts are compared, and the power of their variance, with a
@@ -55,6 +55,8 @@ SMOOTHING_LENGTH = 0.03
 """Width of the smoothing along borders at smoothness 1, in units of the square root of the area."""
 VANISHED = 0.5
 """A kind that keeps less than this share of its area when borders move is merged before all others."""
+K_MEANS_ROUNDS = 10
+"""Most rounds of k-means: later ones move places between clusters of one kind, and carry noise on."""
 FOUND = 0.7
 """Share of the time of learning after which the kinds are found."""
 
@@ -215,14 +217,12 @@ def _fitted_inside(
     Larger kinds have more clusters, by the square root of their area. With full matrices each kind has one.
     """
     places, shares = training.standardized @ axes, training.shares
-    # In an order that does not depend on that of the vertices, nor do the starts of k-means then.
-    in_order = np.argsort(places[:, 0], kind="stable")
     present = np.unique(kind_of_samples)
     sizes = np.sqrt([shares[kind_of_samples == k].sum() for k in present])
     cluster = np.empty(len(places), dtype=np.int64)
     kinds: list[int] = []
     for k, size in zip(present, sizes, strict=True):
-        members = in_order[kind_of_samples[in_order] == k]
+        members = np.flatnonzero(kind_of_samples == k)
         wanted = 1 if covariance_type == "full" else max(1, round(count * size / sizes.sum()))
         inside = _clusters(places[members], shares[members], wanted)
         cluster[members] = len(kinds) + inside
@@ -238,10 +238,48 @@ def _clusters(places: FloatArray, shares: FloatArray, count: int) -> IntArray:
     """(n,) cluster of each place by k-means: 0, 1, …; fewer than `count` if there are fewer distinct places."""
     if count == 1 or len(places) <= 1:
         return np.zeros(len(places), dtype=np.int64)
+    halves = _halves(places, shares, count)
+    starts = np.array(
+        [np.average(places[halves == i], axis=0, weights=shares[halves == i]) for i in range(halves.max() + 1)]
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)  # about too few distinct places
-        found = KMeans(min(count, len(places)), n_init=1, random_state=0).fit_predict(places, sample_weight=shares)
+        found = KMeans(len(starts), init=starts, n_init=1, max_iter=K_MEANS_ROUNDS).fit_predict(
+            places, sample_weight=shares
+        )
     return np.unique(found, return_inverse=True)[1].ravel()
+
+
+def _halves(places: FloatArray, shares: FloatArray, count: int) -> IntArray:
+    """(n,) cluster of each place: the widest one is halved, across its longest axis, until there are `count`.
+
+    From these k-means ends alike after a little noise, which it does not from random places.
+    """
+    cluster = np.zeros(len(places), dtype=np.int64)
+    width, far = _across_longest_axis(places, shares)
+    widths, halves = [width], [far]
+    while len(widths) < count:
+        widest = int(np.argmax(widths))
+        far = halves[widest]
+        if not far.any():
+            break
+        members = np.flatnonzero(cluster == widest)
+        cluster[members[far]] = len(widths)
+        widths[widest], halves[widest] = _across_longest_axis(places[members[~far]], shares[members[~far]])
+        width, far = _across_longest_axis(places[members[far]], shares[members[far]])
+        widths.append(width)
+        halves.append(far)
+    return cluster
+
+
+def _across_longest_axis(places: FloatArray, shares: FloatArray) -> tuple[float, BoolArray]:
+    """Sum of squares of places along their longest axis, and (n,) which lie in its far half; none if all are equal."""
+    offset = places - np.average(places, axis=0, weights=shares)
+    squares, axes = np.linalg.eigh((offset * shares[:, None]).T @ offset)
+    along = offset @ axes[:, -1]
+    # A direction that does not depend on the library's choice of sign.
+    far = along * (-1 if shares @ along**3 < 0 else 1) > 0
+    return float(squares[-1]), far & bool(squares[-1] > 0 and not far.all())
 
 
 def _mean_posteriors(

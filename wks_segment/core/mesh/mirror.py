@@ -9,6 +9,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.spatial import cKDTree
 
+from .canonical import Frame
 from .triangle_mesh import FloatArray, IntArray, TriangleMesh
 
 TOLERANCE, FACE_TOLERANCE, HALF_TOLERANCE = 0.003, 0.3, 0.35
@@ -23,6 +24,11 @@ LEAST_SHARE = 0.5
 """Least share of the area that must have a mirror image: below, likeness is a coincidence."""
 EXACT_SHARE = 0.999
 """Share of the area with a mirror image above which a mesh is symmetric as a whole."""
+FIT_REACH, FIT_ROUNDS = 0.05, 4
+"""How far from the image of a face another one is looked for when a mirror plane is fitted, in units of the extent of
+the mesh, halved in each of so many rounds."""
+ON_PLANE = 1e-9
+"""Distance from the mirror plane, in the same unit, below which a face lies on it."""
 OUTSIDE_PLANE = 0.03
 """Least mean distance of the faces from the mirror plane, in units of the square root of the area: a sheet is its own
 mirror image in its plane, which says nothing."""
@@ -103,39 +109,86 @@ def mirrored_faces(mesh: TriangleMesh) -> IntArray | None:
 def _mirror(mesh: TriangleMesh) -> Mirror | None:
     """Mirror images of the faces of a mesh; None if it is not symmetric.
 
-    The mirror plane is perpendicular to an axis and lies in the middle of the mesh. Of several planes it is the one
-    that mirrors most of the area, the first axis if they are alike.
+    Of several planes it is the one that mirrors most of the area, the first of `_planes` if they are alike.
     """
     centers, areas = mesh.face_centers, mesh.face_areas
-    corners = mesh.vertices[np.unique(mesh.faces)]
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    tolerance = TOLERANCE * float((high - low).max()) + FACE_TOLERANCE * np.sqrt(areas)
+    size = float(np.ptp(mesh.vertices[np.unique(mesh.faces)], axis=0).max())
+    tolerance = TOLERANCE * size + FACE_TOLERANCE * np.sqrt(areas)
     points = mesh.vertices[mesh.faces]
     longest = np.linalg.norm(points - np.roll(points, 1, axis=1), axis=2).max(axis=1)
-    of_halves = TOLERANCE * float((high - low).max()) + HALF_TOLERANCE * longest
+    of_halves = TOLERANCE * size + HALF_TOLERANCE * longest
     # A face and its mirror image are of one size, so that a large one is not taken for small ones beside its image.
     places = np.column_stack([centers, np.sqrt(areas)])
     tree = cKDTree(places)
     best, best_share = None, LEAST_SHARE
-    for axis in range(3):
-        middle = (low[axis] + high[axis]) / 2
-        if np.average(np.abs(centers[:, axis] - middle), weights=areas) < OUTSIDE_PLANE * np.sqrt(mesh.area):
+    some = slice(None, None, max(1, len(places) // SAMPLED_FACES))
+    for plane in _planes(mesh):
+        if np.average(np.abs(plane.distances(centers)), weights=areas) < OUTSIDE_PLANE * np.sqrt(mesh.area):
             continue
-        images = places.copy()
-        images[:, axis] = 2 * middle - images[:, axis]
-        some = slice(None, None, max(1, len(places) // SAMPLED_FACES))
-        near = _nearest(tree, images[some], tolerance)[0] < tolerance[some]
+        near = _nearest(tree, plane.images(places[some]), tolerance)[0] < tolerance[some]
         if areas[some][near].sum() < LEAST_SHARE / 2 * areas[some].sum():
             continue
+        images = plane.images(places)
         image = _mutual(tree, images, tolerance)
         share = float(areas[image >= 0].sum() / areas.sum())
         if share > best_share + 1e-6:
-            best, best_share = (image, images, centers[:, axis] - middle), share
+            best, best_share = (image, images, plane.distances(centers)), share
     if best is None:
         return None
-    image, images, offset = best
-    side = np.sign(np.round(offset, 12)).astype(np.int64)
+    image, images, distances = best
+    side = np.where(np.abs(distances) < ON_PLANE * size, 0, np.sign(distances)).astype(np.int64)
     return Mirror(_with_halves(image, tree, images, of_halves), side)
+
+
+@dataclass(frozen=True)
+class _Plane:
+    """Points x with normal · x = offset, given the (3,) unit normal and the offset."""
+
+    normal: FloatArray
+    offset: float
+
+    def distances(self, points: FloatArray) -> FloatArray:
+        """(k,) signed distances of points from the plane."""
+        return np.asarray(points @ self.normal - self.offset)
+
+    def images(self, places: FloatArray) -> FloatArray:
+        """(k, 4) mirror images of places, which are points and a number that stays."""
+        images = places.copy()
+        images[:, :3] -= 2 * self.distances(places[:, :3])[:, None] * self.normal
+        return images
+
+
+def _planes(mesh: TriangleMesh) -> list[_Plane]:
+    """Planes that may be mirror planes of a mesh: across its coordinate axes, and across its own axes.
+
+    The first lie in the middle of its extent. A mirror plane is perpendicular to one of the principal axes; where a
+    sword or a ponytail turns these away a little, the plane is moved to where most faces have an image near it.
+    """
+    corners = mesh.vertices[np.unique(mesh.faces)]
+    middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    frame = Frame.of(mesh)
+    places = np.column_stack([mesh.face_centers, np.sqrt(mesh.face_areas)])
+    own = [_Plane(axis, float(axis @ frame.middle)) for axis in frame.axes.T]
+    return [_Plane(axis, float(axis @ middle)) for axis in np.eye(3)] + [_fitted(plane, places) for plane in own]
+
+
+def _fitted(plane: _Plane, places: FloatArray) -> _Plane:
+    """The plane, moved to the middle between faces and those nearest to their images, a few times."""
+    some = places[:: max(1, len(places) // SAMPLED_FACES)]
+    tree = cKDTree(places)
+    reach = FIT_REACH * float(np.ptp(places[:, :3], axis=0).max())
+    for _ in range(FIT_ROUNDS):
+        distance, nearest = tree.query(plane.images(some), distance_upper_bound=reach)
+        found = np.isfinite(distance)
+        if not found.any():
+            break
+        one, other = some[found, :3], places[nearest[found], :3]
+        between, areas = one - other, some[found, 3] ** 2
+        normal = np.linalg.eigh((between * areas[:, None]).T @ between)[1][:, -1]
+        middles = (one + other) / 2 @ normal
+        plane = _Plane(normal, float(np.median(middles)))
+        reach /= 2
+    return plane
 
 
 def is_exact(image: IntArray | None, areas: FloatArray) -> bool:

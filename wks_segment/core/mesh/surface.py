@@ -17,6 +17,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.spatial import cKDTree
 
 from ..message import Message, message_of
+from .canonical import most_spread, order_of_faces, order_of_vertices
 from .islands import ties_between_islands
 from .mirror import Mirror, mirror_of
 from .repair import caps_of_small_holes, without_spikes
@@ -62,7 +63,7 @@ class Surface:
         The mesh as it was given.
     mesh : TriangleMesh
         The copy: seams welded, every vertex in a face, no spikes, small holes closed, edges short enough, islands
-        tied.
+        tied. The order of its vertices and faces does not depend on that of the original ones.
     vertex_of : (n,) int array
         The vertex of `mesh` that stands for each vertex of `original`: for a vertex without a face or of an island that
         is left out, the nearest one.
@@ -120,6 +121,10 @@ class Connection:
         Whether each face is part of the surface.
     ties : (t, 2) int array
         Pairs of welded vertices that tie islands together.
+    vertices : (n,) int array
+        The vertices in an order that depends on the shape alone.
+    faces : (m,) int array
+        The faces in such an order.
     mirror : Mirror or None
         Mirror images of the faces at rest, or in the most symmetric pose; None if the mesh is not symmetric.
     """
@@ -127,12 +132,15 @@ class Connection:
     welded: IntArray
     kept: BoolArray
     ties: IntArray
+    vertices: IntArray
+    faces: IntArray
     mirror: Mirror | None = None
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Arrays by name, to tell whether two connections are the same."""
         mirror = {} if self.mirror is None else {"image": self.mirror.image, "side": self.mirror.side}
-        return {"welded": self.welded, "kept": self.kept, "ties": self.ties, **mirror}
+        order = {"vertices": self.vertices, "faces": self.faces}
+        return {"welded": self.welded, "kept": self.kept, "ties": self.ties, **order, **mirror}
 
 
 def connect(*poses: TriangleMesh, rest: TriangleMesh | None = None, pieces: IslandMode = "joined") -> Connection:
@@ -160,10 +168,17 @@ def connect(*poses: TriangleMesh, rest: TriangleMesh | None = None, pieces: Isla
     if not kept.any():
         raise ValueError("every face of the mesh collapses when vertices at the same position are joined")
     kept[kept] = _in_large_islands(first, faces[kept], pieces)
+    at_rest = most_spread(poses) if rest is None else rest
+    vertex_order, face_order = order_of_vertices(at_rest), order_of_faces(at_rest)
     ties = np.zeros((0, 2), dtype=np.int64)
     if pieces == "joined":
-        ties = ties_between_islands(faces[kept], *(pose.vertices for pose in (poses if rest is None else [rest])))
-    return Connection(welded, kept, ties, mirror_of(poses if rest is None else [rest]))
+        number = np.empty_like(vertex_order)
+        number[vertex_order] = np.arange(len(number))
+        in_order = face_order[kept[face_order]]
+        places = [pose.vertices[vertex_order] for pose in (poses if rest is None else [rest])]
+        ties = vertex_order[ties_between_islands(number[faces[in_order]], *places)]
+    mirror = mirror_of(poses if rest is None else [rest])
+    return Connection(welded, kept, ties, vertex_order, face_order, mirror)
 
 
 def connect_alike(
@@ -205,13 +220,15 @@ def prepare_surface(
     """
     connection = connection or connect(mesh, pieces=pieces)
     welded_faces = connection.welded[mesh.faces]
-    face_of = np.flatnonzero(connection.kept)
+    face_of = connection.faces[connection.kept[connection.faces]]
     faces = welded_faces[face_of]
 
-    used = np.unique(faces)
+    in_use = np.zeros(mesh.n_vertices, dtype=bool)
+    in_use[faces] = True
+    used = connection.vertices[in_use[connection.vertices]]
     compact = np.full(mesh.n_vertices, -1)
     compact[used] = np.arange(len(used))
-    vertices, faces = mesh.vertices[used], compact[faces]
+    vertices, faces = mesh.vertices[used], _lowest_first(compact[faces])
     vertex_of = np.full(mesh.n_vertices, -1)
     vertex_of[mesh.faces] = compact[welded_faces]
     outside = np.flatnonzero(vertex_of < 0)
@@ -247,6 +264,12 @@ def _in_large_islands(mesh: TriangleMesh, faces: IntArray, pieces: IslandMode) -
     among_largest[largest_first[: MOST_ISLANDS[pieces]]] = True
     large = size >= LEAST_ISLAND_SHARE[pieces] * size.sum()
     return (among_largest & large if large.any() else among_largest)[island]
+
+
+def _lowest_first(faces: IntArray) -> IntArray:
+    """(m, 3) the same faces, each beginning with its lowest vertex."""
+    corners = (faces.argmin(axis=1)[:, None] + np.arange(3)) % 3
+    return np.take_along_axis(faces, corners, axis=1)
 
 
 def shares_at_vertices(surface: Surface, region: IntArray, count: int) -> FloatArray:

@@ -72,6 +72,10 @@ class TriangleMesh:
             vertices, faces, links = moved, place[faces], place[links]
         return TriangleMesh(vertices, faces, links, lengths, self.layers)
 
+    def at(self, places: FloatArray) -> TriangleMesh:
+        """The same mesh with other positions of its vertices; its lengths stay if they were given."""
+        return TriangleMesh(places, self.faces, self.links, self._lengths, self.layers)
+
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Arrays from which `of_arrays` makes the same mesh again."""
         arrays = {"vertices": self.vertices, "faces": self.faces, "links": self.links, "layers": np.array(self.layers)}

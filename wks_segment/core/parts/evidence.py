@@ -14,6 +14,7 @@ import numpy as np
 
 from ..geometry.creases import BorderShape, border_shape
 from ..mesh.adjacency import FaceAdjacency
+from ..mesh.canonical import order_of_faces, spread
 from ..mesh.mirror import mirrored_faces
 from ..mesh.surface import Surface
 from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
@@ -39,7 +40,7 @@ class Evidence:
     areas : (m,) array
         Shares of the whole area.
     centers : (m, 3) array
-        At rest if possible, otherwise in the first pose, for a surface of area 1.
+        At rest if possible, otherwise in the pose whose limbs are stretched out most, for a surface of area 1.
     neighbors : FaceAdjacency
         Faces that share an edge, then faces of islands that are tied; lengths for a surface of area 1.
     curvature : (p,) array
@@ -50,6 +51,8 @@ class Evidence:
         Logarithm of the radius of the largest inner ball.
     image : (m,) int array or None
         Mirror image of each face at rest, −1 for none; None if the mesh is not symmetric.
+    order : (m,) int array
+        The faces in an order that depends on the shape alone.
     """
 
     poses: Sequence[Workpiece]
@@ -60,6 +63,7 @@ class Evidence:
     fine_curvature: FloatArray
     thickness: FloatArray
     image: IntArray | None
+    order: IntArray
 
     @classmethod
     def of(
@@ -71,7 +75,7 @@ class Evidence:
         ----------
         poses
         rest : TriangleMesh or None
-            The mesh at rest, which shows its symmetry; the first pose if None.
+            The mesh at rest, which shows its symmetry.
         progress : Progress
         cache : Cache, optional
             Searched for creases and thickness; what is measured is added to it.
@@ -81,6 +85,8 @@ class Evidence:
         ValueError
             If `rest` has other faces than the first pose.
         """
+        # Some measures are of a few of the poses only: which ones must not depend on their order.
+        poses = sorted(poses, key=lambda pose: -spread(pose.surface.original))
         first = poses[0]
         if rest is not None and not np.array_equal(rest.faces, first.surface.original.faces):
             raise ValueError("rest has other faces than the first pose: pass the same mesh, in its rest position")
@@ -92,6 +98,7 @@ class Evidence:
         none = np.zeros(len(pairs))
         mirror = first.surface.mirror
         image = mirrored_faces(rest) if rest is not None else None if mirror is None else mirror.image
+        at_rest = first.surface.original if rest is None else rest
         originals = [pose.surface.original for pose in poses]
         edges = FaceAdjacency(
             np.concatenate([first.neighbors.pairs, pairs]),
@@ -100,12 +107,13 @@ class Evidence:
         return cls(
             poses,
             np.mean([mesh.face_areas / mesh.area for mesh in originals], axis=0),
-            (originals[0] if rest is None else rest).unit_face_centers,
+            at_rest.unit_face_centers,
             edges,
             np.append(mean[0], none),
             np.append(mean[1], none),
             np.mean([shape.thickness for shape in shapes], axis=0),
             image,
+            order_of_faces(at_rest),
         )
 
 

@@ -14,12 +14,13 @@ import numpy as np
 
 from ..geometry.agglomeration import merge_in_table
 from ..geometry.creases import MOST_CONCAVE, weights_of_borders
+from ..mesh.adjacency import FaceAdjacency
 from ..mesh.mirror import is_exact
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ..progress import Progress
 from .evidence import Evidence
 from .motion import edge_correlations, turns
-from .patches import patches_of
+from .patches import in_steps, patches_of
 from .visibility import visible
 
 SMALLER_AREA, LARGER_AREA, CONCAVITY, VISIBILITY, THICKNESS, GAIN, WEIGHT, OFFSET = (
@@ -85,7 +86,8 @@ class PartGraph:
     def of(cls, evidence: Evidence, signature: FloatArray, progress: Progress | None = None) -> PartGraph:
         """Patches of a mesh as the first regions, given (m, d) values of the faces to be summed as signatures."""
         areas, neighbors = evidence.areas, evidence.neighbors
-        patch = patches_of(evidence.centers, areas, neighbors, evidence.fine_curvature, evidence.image)
+        patch = np.empty(len(areas), dtype=np.int64)
+        patch[evidence.order] = patches_of(*_in_order(evidence))
         count = int(patch.max()) + 1
         weight = weights_of_borders(neighbors.pairs, evidence.centers, evidence.curvature, evidence.thickness)
         concave = np.clip(-evidence.curvature, 0, MOST_CONCAVE)
@@ -98,7 +100,7 @@ class PartGraph:
             return sums + sums.T
 
         patch_areas = np.maximum(np.bincount(patch, areas, count), TINY)
-        middle = _middle_faces(patch, evidence.centers, areas)
+        middle = _middle_faces(patch, evidence)
         viewers = evidence.poses[:VIEWERS]
         seen = np.mean([visible(pose, middle, step) for pose, step in Progress.of(progress).each(viewers)], axis=0)
         meshes = [pose.surface.original for pose in evidence.poses]
@@ -232,10 +234,23 @@ def _mirrored_patches(patch: IntArray, evidence: Evidence) -> IntArray | None:
     return np.where(mirrored[mirrored] == own_number, mirrored, own_number)
 
 
-def _middle_faces(patch: IntArray, centers: FloatArray, areas: FloatArray) -> IntArray:
+def _in_order(evidence: Evidence) -> tuple[FloatArray, FloatArray, FaceAdjacency, FloatArray, IntArray | None]:
+    """What patches depend on, with the faces in an order that depends on the shape alone."""
+    order, neighbors, image = evidence.order, evidence.neighbors, evidence.image
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    if image is not None:
+        image = np.where(image[order] >= 0, place[image[order]], -1)
+    adjacency = FaceAdjacency(place[neighbors.pairs], neighbors.lengths)
+    return evidence.centers[order], evidence.areas[order], adjacency, evidence.fine_curvature, image
+
+
+def _middle_faces(patch: IntArray, evidence: Evidence) -> IntArray:
     """(n,) face of each patch whose center is nearest to the middle of the patch."""
+    patch, centers, areas = patch[evidence.order], evidence.centers[evidence.order], evidence.areas[evidence.order]
     count = int(patch.max()) + 1
     total = np.maximum(np.bincount(patch, areas, count), TINY)
     middles = np.stack([np.bincount(patch, areas * axis, count) for axis in centers.T], axis=1) / total[:, None]
-    order = np.lexsort((np.linalg.norm(centers - middles[patch], axis=1), patch))
-    return np.asarray(order[np.searchsorted(patch[order], np.arange(count))])
+    distances = in_steps(np.linalg.norm(centers - middles[patch], axis=1))
+    nearest_first = np.lexsort((distances, patch))
+    return evidence.order[nearest_first[np.searchsorted(patch[nearest_first], np.arange(count))]]

@@ -15,6 +15,13 @@ SINGLE_FACES = 600
 """Largest number of faces for which each face is a patch of its own."""
 CREASE, STEEPEST = 0.3, 15.0
 """Extra length of a path across a crease, in units of its curvature up to a limit, so that patches end at creases."""
+STEP = 2.0**-30
+"""Lengths are whole multiples of this, whose sums are exact: equal ones stay equal, and rounding does not choose."""
+
+
+def in_steps(lengths: FloatArray) -> FloatArray:
+    """Lengths, for a surface of area 1, as whole multiples of `STEP`."""
+    return np.asarray(np.round(lengths / STEP) * STEP)
 
 
 def patches_of(
@@ -39,7 +46,7 @@ def patches_of(
         return np.arange(m)
     a, b = adjacency.pairs.T
     steps = np.linalg.norm(centers[a] - centers[b], axis=1)
-    lengths = steps * (1 + CREASE * np.clip(-curvature, 0, STEEPEST)) + 1e-9
+    lengths = in_steps(steps * (1 + CREASE * np.clip(-curvature, 0, STEEPEST))) + STEP
     graph = coo_matrix((np.append(lengths, lengths), (np.append(a, b), np.append(b, a))), shape=(m, m)).tocsr()
     sources = _seeds(centers, areas, adjacency, image)
     nearest = dijkstra(graph, indices=sources, min_only=True, return_predecessors=True)[2]
@@ -52,7 +59,7 @@ def _seeds(centers: FloatArray, areas: FloatArray, adjacency: FaceAdjacency, ima
     """Faces as far from each other as possible, with their mirror images; each connected group of faces has one."""
     # The face farthest from the middle comes first, wherever it is in the file.
     offset = centers - np.average(centers, axis=0, weights=areas)
-    seeds = [int(np.einsum("ij,ij->i", offset, offset).argmax())]
+    seeds = [int(in_steps(np.einsum("ij,ij->i", offset, offset)).argmax())]
     distance = np.full(len(centers), np.inf)
     measured = 0
     while True:
@@ -60,7 +67,7 @@ def _seeds(centers: FloatArray, areas: FloatArray, adjacency: FaceAdjacency, ima
             seeds.append(int(image[seeds[-1]]))
         for seed in seeds[measured:]:
             offset = centers - centers[seed]
-            np.minimum(distance, np.einsum("ij,ij->i", offset, offset), out=distance)
+            np.minimum(distance, in_steps(np.einsum("ij,ij->i", offset, offset)), out=distance)
         measured = len(seeds)
         if len(seeds) >= min(N_PATCHES, len(centers)):
             break

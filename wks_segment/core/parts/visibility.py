@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..geometry.creases import smooth_normals, vertex_normals
+from ..mesh.canonical import Frame
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ..poses.pose_cache import Workpiece
 from ..progress import Progress
@@ -30,10 +31,12 @@ def visible(pose: Workpiece, faces: IntArray, progress: Progress | None = None) 
     """(r, r) whether the centers of some faces of a pose see each other through the inside; true on the diagonal."""
     surface = pose.surface
     unit = np.sqrt(surface.original.area)
-    vertices = surface.mesh.vertices / unit
-    normals = smooth_normals(vertex_normals(surface), pose.flows.short(NORMAL_LENGTH))
+    # The search is approximate along the axes; in the frame of the shape it ends alike for a turned mesh.
+    frame = Frame.of(surface.mesh)
+    vertices = frame.places(surface.mesh.vertices) / unit
+    normals = frame.directions(smooth_normals(vertex_normals(surface), pose.flows.short(NORMAL_LENGTH)))
     tree = cKDTree(vertices)
-    places = surface.original.face_centers[faces] / unit
+    places = frame.places(surface.original.face_centers[faces]) / unit
     directions = surface.to_faces(normals)[faces]
     count = len(faces)
     first, second = np.triu_indices(count, 1)
