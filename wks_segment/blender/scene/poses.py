@@ -10,8 +10,10 @@ import numpy as np
 
 from ...core import TriangleMesh
 from ...core.mesh.triangle_mesh import FloatArray, IntArray, repeats_a_vertex
+from ...core.mesh.symmetry import upright_axes
 from ...core.message import Message, message_of
 from ..errors import OtherFacesError, UserError
+from .bone_sides import left_by_bones
 from .characters import Character, armature_of, polygon_ranges, quoted, vertex_ranges
 from .simulations import must_not_change
 from .surfaces import DEFORMING, origins_of, read_surface
@@ -44,7 +46,9 @@ class Pose:
         The character's own vertex that each vertex of `mesh` is, numbered like polygons, one object after another; −1
         on objects whose modifiers change faces: there, only `polygon_of` connects the pose with the character.
     axes : (3, 3) array
-        The character's own x, y and z axes in world space, as columns. x points to its left.
+        The character's own x, y and z axes in world space, as columns. x usually points to its left.
+    left : (3,) array, optional
+        Direction in world space from bones with names on the right to bones with names on the left, if there are any.
     rest : TriangleMesh, optional
         The same triangles in the rest position of the character's armature, if it has one: there
         islands lie where the artist has placed them. The axes are then those of the rest position.
@@ -56,13 +60,15 @@ class Pose:
     polygon_of: IntArray
     vertex_of: IntArray
     axes: FloatArray
+    left: FloatArray | None = None
     rest: TriangleMesh | None = None
 
     @property
     def upright(self) -> TriangleMesh:
-        """The rest position, or the pose if there is none, in the character's own axes: x points to its left."""
+        """The rest position, or the pose if there is none, turned so that it is symmetric in x, which points left."""
         mesh = self.mesh if self.rest is None else self.rest
-        return TriangleMesh(mesh.vertices @ self.axes, mesh.faces)
+        axes = upright_axes(mesh, self.axes, () if self.left is None else (self.left,))
+        return TriangleMesh(mesh.vertices @ axes, mesh.faces)
 
     def is_like(self, other: Pose) -> bool:
         """Whether the other pose is the same surface at the same place."""
@@ -264,7 +270,7 @@ def with_rest(context: bpy.types.Context, poses: list[Pose]) -> list[Pose]:
         for armature, position in before.items():
             armature.pose_position = position
         context.view_layer.update()
-    return [replace(pose, rest=rest.mesh, axes=rest.axes) if pose.is_mesh_of(rest) else pose for pose in poses]
+    return [replace(pose, rest=rest.mesh, axes=rest.axes, left=rest.left) if pose.is_mesh_of(rest) else pose for pose in poses]
 
 
 def read_pose(context: bpy.types.Context, character: Character, name: str) -> Pose:
@@ -297,7 +303,7 @@ def read_pose(context: bpy.types.Context, character: Character, name: str) -> Po
             owners.append(np.where(polygon_of < 0, -1, polygon_of + polygons.start))
             own.append(np.where(vertex_of < 0, -1, vertex_of + its.start))
             n_vertices += len(points)
-        axes = _axes(character, depsgraph)
+        axes, left = _axes(character, depsgraph), left_by_bones(character)
     faces, polygon_of = np.concatenate(triangles), np.concatenate(owners)
     proper = ~repeats_a_vertex(faces)
     if not (proper.any() and (polygon_of >= 0).any()):
@@ -308,7 +314,7 @@ def read_pose(context: bpy.types.Context, character: Character, name: str) -> Po
         mesh = TriangleMesh(np.concatenate(vertices), faces[proper])
     except ValueError as error:
         raise UserError('"{name}": {reason}', name=name, reason=message_of(error)) from error
-    return Pose(name, character, mesh, polygon_of[proper], np.concatenate(own), axes)
+    return Pose(name, character, mesh, polygon_of[proper], np.concatenate(own), axes, left)
 
 
 def _named(character: Character, name: str) -> Message:
