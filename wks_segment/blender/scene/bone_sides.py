@@ -18,19 +18,20 @@ LEFT, RIGHT = (
 
 
 def left_by_bones(character: Character) -> FloatArray | None:
-    """(3,) direction in world space from the bones on the right to those on the left, at rest; None without such bones."""
+    """(3,) direction in world space from bones on the right to bones on the left, at rest; None without such bones."""
     for armature in dict.fromkeys(map(armature_of, character.objects)):
         if armature is None:
             continue
-        sides = [_center(armature, [bone for bone in armature.data.bones if side.search(bone.name)]) for side in (LEFT, RIGHT)]
-        if sides[0] is not None and sides[1] is not None:
-            direction = np.array(armature.matrix_world, dtype=np.float64)[:3, :3] @ (sides[0] - sides[1])
+        left, right = _center(armature, LEFT), _center(armature, RIGHT)
+        if left is not None and right is not None:
+            direction = np.array(armature.matrix_world, dtype=np.float64)[:3, :3] @ (left - right)
             if direction.any():
                 return np.asarray(direction)
     return None
 
 
-def _center(armature: bpy.types.Object, bones: list[bpy.types.Bone]) -> FloatArray | None:
-    """(3,) mean place of bones in the space of the armature; None for no bones."""
+def _center(armature: bpy.types.Object, names: re.Pattern[str]) -> FloatArray | None:
+    """(3,) mean place of the bones whose names match, in the space of the armature; None for no bones."""
+    bones = [bone for bone in armature.data.bones if names.search(bone.name)]
     places = [bone.head_local for bone in bones] + [bone.tail_local for bone in bones]
     return np.mean(places, axis=0) if places else None

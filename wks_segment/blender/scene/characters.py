@@ -153,6 +153,23 @@ def with_rigged(selected: Iterable[bpy.types.Object], visible: Iterable[bpy.type
     return chosen
 
 
+def evaluated_objects(layer: bpy.types.ViewLayer) -> set[bpy.types.Object]:
+    """The objects that Blender evaluates in a view layer: not disabled in viewports, nor in a collection that is.
+
+    Others would have no modifiers, and one shape in all frames. What is only hidden is evaluated.
+    """
+    found: set[bpy.types.Object] = set()
+    collections = [layer.layer_collection]
+    while collections:
+        collection = collections.pop()
+        if collection.collection.hide_viewport:
+            continue
+        if not collection.exclude:
+            found.update(obj for obj in collection.collection.objects if not obj.hide_viewport)
+        collections += collection.children
+    return found
+
+
 def quoted(names: Iterable[str]) -> str:
     """Names in quotes, with commas between them."""
     return ", ".join(f'"{name}"' for name in names)
@@ -172,15 +189,17 @@ def why_no_mesh(objects: Iterable[bpy.types.Object]) -> str:
 
 
 def _draws_a_bone(obj: bpy.types.Object) -> bool:
-    """Whether an object only shows the shape of a bone, as importers add such objects."""
-    if obj.parent is not None or obj.modifiers:
+    """Whether an object only shows the shape of a bone, as importers add such objects, alone or under an Empty."""
+    if obj.modifiers or armature_of(obj) is not None:
         return False
     rigs = [other for other in bpy.data.objects if other.type == "ARMATURE" and other.pose is not None]
     return any(bone.custom_shape == obj for rig in rigs for bone in rig.pose.bones)
 
 
 def group(objects: Sequence[bpy.types.Object], together: bool = False) -> list[Character]:
-    """Group mesh objects into characters: objects with the same armature or parented to each other are one.
+    """Group mesh objects into characters: those with the same armature or parented to each other are one.
+
+    So are objects without an armature that are parented to one animated object, such as an Empty that is driven.
 
     Parameters
     ----------
@@ -212,11 +231,17 @@ def group(objects: Sequence[bpy.types.Object], together: bool = False) -> list[C
 
 
 def _body_of(obj: bpy.types.Object, among: set[bpy.types.Object]) -> bpy.types.Object:
-    """The armature of an object, else the topmost of its parents that is among the objects, else the object itself."""
+    """The armature of an object, else the topmost of its parents that is among the objects or animated, else itself."""
     armature = armature_of(obj)
     if armature is not None:
         return armature
     body, parent = obj, obj.parent
     while parent is not None:
-        body, parent = (parent if parent in among else body), parent.parent
+        body, parent = (parent if parent in among or _is_animated(parent) else body), parent.parent
     return body if body is obj else _body_of(body, among)
+
+
+def _is_animated(obj: bpy.types.Object) -> bool:
+    """Whether an object has an action or a strip of animation of its own."""
+    data = obj.animation_data
+    return data is not None and (data.action is not None or any(len(track.strips) for track in data.nla_tracks))

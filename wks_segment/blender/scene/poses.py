@@ -9,8 +9,8 @@ import bpy
 import numpy as np
 
 from ...core import TriangleMesh
-from ...core.mesh.triangle_mesh import FloatArray, IntArray, repeats_a_vertex
 from ...core.mesh.symmetry import upright_axes
+from ...core.mesh.triangle_mesh import FloatArray, IntArray, repeats_a_vertex
 from ...core.message import Message, message_of
 from ..errors import OtherFacesError, UserError
 from .bone_sides import left_by_bones
@@ -175,21 +175,20 @@ def _with_same_faces(poses: list[Pose], refused: list[Message]) -> list[Pose]:
     return [pose for pose, is_alike in zip(poses, most, strict=True) if is_alike]
 
 
-def read_markers(context: bpy.types.Context, character: Character, count: int) -> list[Pose]:
-    """A character at the frames of at most `count` markers of the timeline, evenly chosen.
-
-    Raises
-    ------
-    UserError
-        If there are no markers.
-    """
+def marked_frames(scene: bpy.types.Scene, count: int) -> dict[int, str]:
+    """Name by frame of at most `count` markers of the timeline, evenly chosen; UserError if there are none."""
     names: dict[int, str] = {}
-    for marker in sorted(context.scene.timeline_markers, key=lambda marker: marker.frame):
+    for marker in sorted(scene.timeline_markers, key=lambda marker: marker.frame):
         names.setdefault(marker.frame, marker.name)
     if not names:
         raise UserError("There are no markers in the timeline: add some (M), or take poses from elsewhere")
-    frames = [list(names)[i] for i in evenly(0, len(names) - 1, count)]
-    return read_frames(context, character, frames, [names[frame] for frame in frames])
+    return {frame: names[frame] for frame in [list(names)[i] for i in evenly(0, len(names) - 1, count)]}
+
+
+def read_markers(context: bpy.types.Context, character: Character, count: int) -> list[Pose]:
+    """A character at the frames of at most `count` markers; UserError if there are none."""
+    names = marked_frames(context.scene, count)
+    return read_frames(context, character, list(names), list(names.values()))
 
 
 def read_shape_keys(context: bpy.types.Context, character: Character, count: int) -> list[Pose]:
@@ -270,7 +269,10 @@ def with_rest(context: bpy.types.Context, poses: list[Pose]) -> list[Pose]:
         for armature, position in before.items():
             armature.pose_position = position
         context.view_layer.update()
-    return [replace(pose, rest=rest.mesh, axes=rest.axes, left=rest.left) if pose.is_mesh_of(rest) else pose for pose in poses]
+    return [
+        replace(pose, rest=rest.mesh, axes=rest.axes, left=rest.left) if pose.is_mesh_of(rest) else pose
+        for pose in poses
+    ]
 
 
 def read_pose(context: bpy.types.Context, character: Character, name: str) -> Pose:

@@ -112,15 +112,13 @@ def read_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, origins:
     return ObjectSurface(vertices, triangles, polygon_of, vertex_of)
 
 
-def _origin_of_faces(
-    obj: bpy.types.Object, mesh: bpy.types.Mesh, origins: Origins, pose: str
-) -> tuple[IntArray, bool]:
+def _origin_of_faces(obj: bpy.types.Object, mesh: bpy.types.Mesh, origins: Origins, pose: str) -> tuple[IntArray, bool]:
     """Polygon of the object's own mesh that each face of its evaluated mesh comes from, −1 for none.
 
     And whether the evaluated mesh has the same faces in the same order.
     """
     own = np.arange(len(obj.data.polygons))
-    is_same = _has_corners_of(mesh, obj.data)
+    is_same = has_corners_of(mesh, obj.data)
     traced = origins.traced.get(obj)
     mark = mesh.attributes.get(origins.marks[obj.data]) if obj.data in origins.marks else None
     if mark is not None and len(mesh.polygons):
@@ -150,7 +148,7 @@ def _origin_of_faces(
     )  # fmt: skip
 
 
-def _has_corners_of(mesh: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:
+def has_corners_of(mesh: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:
     """Whether two meshes have the same number of vertices, and the same polygons with the same corners."""
     return len(mesh.vertices) == len(other.vertices) and np.array_equal(_corners(mesh), _corners(other))
 

@@ -9,20 +9,20 @@ from scipy.spatial import cKDTree
 
 from .triangle_mesh import FloatArray, TriangleMesh
 
-SAMPLES = 3_000
+MIRRORED_POINTS = 3_000
 """Number of points whose mirror images are looked up: more change the mean distance by less than a tenth."""
-SPACING, MOST_STEPS = 0.1, 30
-"""Points on large faces are this far apart, in units of the square root of the area, on a grid of at most so many steps:
-the faces of a box have points to compare, and a mesh of needles does not fill the memory."""
+SPACING, MOST_GRID_STEPS = 0.1, 30
+"""Points on large faces are this far apart, in units of the square root of the area, on a grid of at most so many
+steps: the faces of a box have points to compare, and a mesh of needles does not fill the memory."""
 FAR = 0.1
 """Distance, in units of the square root of the area, beyond which a mirror image counts as having no counterpart."""
 SYMMETRIC = 0.005
-"""Mean distance of mirror images below which a plane may replace the preferred one, if that is above: of 22 rigged characters the plane
-between left and right is below 0.001 if they are as good as symmetric, and every plane between front and back or above
-and below is over 0.007."""
+"""Mean distance of mirror images below which a plane may replace the preferred one, if that is above: of 22 rigged
+characters the plane between left and right is below 0.001 if they are as good as symmetric, and every plane between
+front and back or above and below is over 0.007."""
 CLEARLY_BETTER = 0.3
-"""And below this fraction of the preferred one's: on the two rigs with a wrong axis it is at most 0.04, on the others at
-least 0.36 wherever another plane is better."""
+"""And below this fraction of the preferred one's: it is at most 0.04 on the two rigs with a wrong axis, and at least
+0.36 on the others, wherever another plane is better."""
 ALONG = 0.5
 """Least cosine between a direction to the left and the normal: below, the direction says nothing about the side."""
 
@@ -79,7 +79,7 @@ def mirror_distances(mesh: TriangleMesh, normals: FloatArray) -> FloatArray:
     points, areas = _points_on(mesh)
     points = (points - np.average(points, axis=0, weights=areas)) / np.sqrt(mesh.area)
     tree = cKDTree(points)
-    some = np.arange(0, len(points), max(1, len(points) // SAMPLES))
+    some = np.arange(0, len(points), max(1, len(points) // MIRRORED_POINTS))
     result = np.empty(len(normals))
     for i, normal in enumerate(normals):
         images = points[some] - 2 * np.outer(points[some] @ normal, normal)
@@ -96,7 +96,7 @@ def _points_on(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
     """
     corners, areas = mesh.vertices[mesh.faces], mesh.face_areas
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    steps = np.clip(np.ceil(longest / (SPACING * np.sqrt(mesh.area))), 1, MOST_STEPS).astype(int)
+    steps = np.clip(np.ceil(longest / (SPACING * np.sqrt(mesh.area))), 1, MOST_GRID_STEPS).astype(int)
     points, weights = [], []
     for count in np.unique(steps):
         of = steps == count
