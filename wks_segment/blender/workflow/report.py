@@ -131,8 +131,8 @@ def pose_warnings(poses: Sequence[Pose], asked: int | None) -> list[str]:
         elif different < asked:
             warnings.append(
                 Message(
-                    '"{name}": number of different poses is {different}, not {asked}: its animation has no more in these '
-                    "frames",
+                    '"{name}": number of different poses is {different}, not {asked}: its animation has no more in '
+                    "these frames",
                     name=name, different=different, asked=asked,
                 )
             )  # fmt: skip

@@ -170,6 +170,11 @@ GERMAN_MESSAGES = {
     '"{name}": the poses are from the action "{action}"; others: {others}': '"{name}": die Posen sind aus der Aktion "{action}"; andere: {others}',
     '"{name}": number of different poses is {different}, not {asked}: its animation has no more in these frames': '"{name}": Zahl der verschiedenen Posen ist {different}, nicht {asked}: die Animation hat in diesen Frames nicht mehr',
     'All {count} poses of "{name}" are the same: does an animation move it in these frames?': 'Alle {count} Posen von "{name}" sind gleich: bewegt es in diesen Frames eine Animation?',
+    'The action "{name}" does not fit "{owner}"': 'Die Aktion "{name}" passt nicht zu "{owner}"',
+    "{path}: unknown format; save it as .glb, .fbx or .blend in the program that made it, or in one that opens it. Known are {formats}": "{path}: unbekanntes Format; es als .glb, .fbx oder .blend speichern, in dem Programm, das es gemacht hat, oder in einem, das es öffnet. Bekannt sind {formats}",
+    '{path}: this is no OFF file in plain text: it does not begin with "OFF"': '{path}: das ist keine OFF-Datei in Klartext: sie beginnt nicht mit "OFF"',
+    "{path}: the file ends before all vertices and faces: copy it again": "{path}: die Datei endet vor allen Vertices und Flächen: sie noch einmal kopieren",
+    "{path}: line {line} is no line of an OFF file": "{path}: Zeile {line} ist keine Zeile einer OFF-Datei",
     '"{pose}": a modifier of "{object}" such as Remesh makes faces that cannot be traced to the mesh: apply it, or turn it off': '"{pose}": ein Modifikator von "{object}" wie Remesh macht Flächen, die sich nicht auf das Mesh zurückführen lassen: ihn anwenden oder abschalten',
     '"{pose}": "{object}" has {there} faces there that are not those of its mesh, which has {here}: a cache changes its faces from frame to frame. Take frames in which they stay the same': '"{pose}": "{object}" hat dort {there} Flächen, die nicht die seines Meshs sind, das {here} hat: ein Cache ändert seine Flächen von Frame zu Frame. Frames nehmen, in denen sie gleich bleiben',
     '"{pose}": {names} has other faces there than in "{first}": its nodes change them from frame to frame. Take frames in which the faces stay the same, or turn the nodes off': '"{pose}": {names} hat dort andere Flächen als in "{first}": seine Nodes ändern sie von Frame zu Frame. Frames nehmen, in denen die Flächen gleich bleiben, oder die Nodes abschalten',
@@ -302,6 +307,5 @@ GERMAN_MESSAGES = {
     "{path}: the folder {folder} does not exist": "{path}: den Ordner {folder} gibt es nicht",
     "{path}: this is a folder, give the name of a file": "{path}: das ist ein Ordner, den Namen einer Datei angeben",
     "{path}: unknown format to write; known are {formats}": "{path}: unbekanntes Format zum Schreiben; bekannt sind {formats}",
-    "{path}: unknown format; known are {formats}": "{path}: unbekanntes Format; bekannt sind {formats}",
 }
 """By English template."""
