@@ -101,7 +101,7 @@ def test_frames_in_which_nodes_change_the_faces_are_left_out():
     assert [pose.name for pose in poses] == ["Body, frame 8", "Body, frame 9"]
     assert len(left_out) == 1
     assert '"Body, frame 1"' in left_out[0]
-    with pytest.raises(UserError, match="frame 1.*its nodes change them"):
+    with pytest.raises(UserError, match=r"frame 1.*its nodes change them"):
         reader.read_frames(bpy.context, Character((obj,)), [1, 8, 9])
 
 

@@ -1,5 +1,7 @@
 """Simulations that were played and not baked keep their frames, whatever is asked for."""
 
+from itertools import pairwise
+
 import bpy
 import numpy as np
 import pytest
@@ -50,7 +52,7 @@ def zone_tree():
     start.pair_with_output(end)
     move.inputs["Offset"].default_value = (0, 0, 0.1)
     chain = [tree.nodes.new("NodeGroupInput"), start, move, end, tree.nodes.new("NodeGroupOutput")]
-    for one, other in zip(chain[:-1], chain[1:], strict=True):
+    for one, other in pairwise(chain):
         out = next(socket for socket in one.outputs if socket.type == "GEOMETRY")
         tree.links.new(out, next(socket for socket in other.inputs if socket.type == "GEOMETRY"))
     return tree
