@@ -8,6 +8,7 @@ from builders import (
     changes,
     labels_of,
     limbed,
+    limbed_keys,
     limbed_poses,
     limbed_rigged,
     mesh_object,
@@ -241,3 +242,20 @@ def test_an_error_while_frames_are_read_gives_the_action_back(frames):
     with pytest.raises(UserError, match="Remesh"):
         read_training_poses(bpy.context, frames, Report([]))
     assert not changes(before, pose_snapshot(obj.parent))
+
+
+def test_actions_of_shape_keys_are_chosen_as_well(frames):
+    obj = limbed_keys(0.9)
+    keys = obj.data.shape_keys
+    for name, values in (("Smile", (0.0, 1.0)), ("Still", (0.2, 0.2))):
+        keys.animation_data_create().action = action = bpy.data.actions.new(name)
+        action.use_fake_user = True
+        for i, value in enumerate(values):
+            keys.key_blocks[1].value = value
+            keys.key_blocks[1].keyframe_insert("value", frame=1 + 10 * i)
+    bpy.context.scene.frame_set(1)
+    select(obj)
+    before = scene_snapshot()
+    assert learned(frames)[1] == ['"Keyed": the poses are from the action "Smile"; others: "Still"']
+    assert not changes(before, scene_snapshot())
+    assert (keys.animation_data.action.name, round(keys.key_blocks[1].value, 3)) == ("Still", 0.2)

@@ -47,6 +47,8 @@ def read_poses(
             if writes or over_time:
                 check_simulations(bpy.context.scene, characters, over_time)
             set_action(characters, options.action)
+            if options.object and path.suffix.lower() != ".blend":
+                characters = group([obj for character in characters for obj in character.objects], together=True)
             if over_time:
                 poses += _animated_poses(path, characters, options, report, single)
                 continue

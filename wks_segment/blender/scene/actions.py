@@ -11,12 +11,17 @@ import bpy
 from ...core.message import Message
 from ..errors import UserError
 from .characters import Character, armature_of
-from .kept_pose import kept_pose, to_rest
+from .kept_pose import Posable, kept_pose, parts_of, to_rest
 from .motion import FramesOf, motions
 from .simulations import must_not_change
 
-BONE = re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]')
-"""Matches the data path of an F-curve that moves a bone; the group is the name of the bone."""
+MOVED = {
+    bpy.types.Object: re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]'),
+    bpy.types.Key: re.compile(r'key_blocks\["((?:[^"\\]|\\.)*)"\]'),
+}
+"""Matches the data path of an F-curve that moves a bone or a shape key, by what has these; the group is the name."""
+LEAST_SHARE_KNOWN = 0.5
+"""An action is for an armature that has at least this share of its bones: all rigs share a few names, such as root."""
 NAMED = 8
 """Most actions that a message names."""
 
@@ -26,19 +31,21 @@ def armature_with_bones(character: Character) -> bpy.types.Object | None:
     return next((rig for rig in map(armature_of, character.objects) if rig is not None), None)
 
 
-def actions_for(armature: bpy.types.Object) -> list[bpy.types.Action]:
-    """The actions in this file that move bones of an armature, and do not belong to another one."""
-    others = [obj for obj in bpy.data.objects if obj.type == "ARMATURE" and obj != armature]
-    taken = {obj.animation_data.action for obj in others if obj.animation_data is not None}
-    own = _action(armature)
-    bones = set(armature.pose.bones.keys())
-    return [
-        action for action in bpy.data.actions if action == own or (bones_of(action) & bones and action not in taken)
-    ]
+def actions_for(owner: Posable) -> list[bpy.types.Action]:
+    """The actions in this file that move bones of an armature, or shape keys, and are not assigned to another one."""
+    others = [obj for obj in bpy.data.objects if obj.type == "ARMATURE"] + list(bpy.data.shape_keys)
+    taken = {_action(other) for other in others if other != owner} - {_action(owner)}
+    parts = set(parts_of(owner).keys())
+    found = []
+    for action in bpy.data.actions:
+        moved = moved_by(action, owner)
+        if action not in taken and moved and len(moved & parts) >= LEAST_SHARE_KNOWN * len(moved):
+            found.append(action)
+    return found
 
 
-def assign_action(owner: bpy.types.Object, action: bpy.types.Action) -> None:
-    """Let an action move an object; UserError if it is made for something else."""
+def assign_action(owner: bpy.types.ID, action: bpy.types.Action) -> None:
+    """Let an action move something; UserError if it is made for something else."""
     data = owner.animation_data_create()
     data.action = action
     # From Blender 4.4 on an action has slots; one with another name is not assigned automatically.
@@ -63,22 +70,24 @@ def acting(
     keeps_moving : bool
         Whether the action that is assigned stays if the character moves by it, as the artist sees it.
     """
-    armature = armature_with_bones(character)
-    actions = [] if armature is None else actions_for(armature)
-    own = None if armature is None else _action(armature)
-    if armature is None or not set(actions) - {own} or not _may_act(context, character, armature):
+    owner = armature_with_bones(character) or next(
+        filter(None, (obj.data.shape_keys for obj in character.objects)), None
+    )
+    actions = [] if owner is None else actions_for(owner)
+    own = None if owner is None else _action(owner)
+    if owner is None or not set(actions) - {own} or not _may_act(context, character, owner):
         yield []
         return
-    with kept_pose(context, armature) as kept:
+    with kept_pose(context, owner) as kept:
         (motion,) = motions(context, [character], frames_of)
         bending: dict[bpy.types.Action | None, float] = {own: motion.bending}
         if not (keeps_moving and motion.is_bent):
             for action in actions:
-                if action not in bending and _acts(armature, action):
+                if action not in bending and _acts(owner, action):
                     bending[action] = motions(context, [character], frames_of)[0].bending
         best = max(bending, key=bending.__getitem__)  # the assigned one, if all are static
         if best != own:
-            _acts(armature, best)
+            _acts(owner, best)
         elif len(bending) > 1:
             kept.restore(context)
         yield [_note(character, best, [action for action in actions if action != best])]
@@ -97,35 +106,35 @@ def _note(character: Character, action: bpy.types.Action | None, others: list[bp
     )  # fmt: skip
 
 
-def _may_act(context: bpy.types.Context, character: Character, armature: bpy.types.Object) -> bool:
+def _may_act(context: bpy.types.Context, character: Character, owner: Posable) -> bool:
     """Whether another action can be tried: not in tweak mode, not on linked data, and not if a simulation would lose
     its frames by that."""
-    data = armature.animation_data
-    is_free = armature.library is None and armature.override_library is None
+    data = owner.animation_data
+    is_free = owner.library is None and owner.override_library is None
     return is_free and not (data and data.use_tweak_mode) and not must_not_change(context.scene, character)
 
 
-def _action(owner: bpy.types.Object) -> bpy.types.Action | None:
+def _action(owner: bpy.types.ID) -> bpy.types.Action | None:
     return None if owner.animation_data is None else owner.animation_data.action
 
 
-def _acts(armature: bpy.types.Object, action: bpy.types.Action) -> bool:
-    """Assign an action to an armature at rest, alone; False if it does not fit."""
-    to_rest(armature)
+def _acts(owner: Posable, action: bpy.types.Action) -> bool:
+    """Assign an action, alone, to an armature or shape keys at rest; False if it does not fit."""
+    to_rest(owner)
     try:
-        assign_action(armature, action)
+        assign_action(owner, action)
     except UserError:
         return False
-    armature.animation_data.use_nla = False
+    owner.animation_data.use_nla = False
     return True
 
 
-def bones_of(action: bpy.types.Action) -> set[str]:
-    """Names of the bones that an action moves."""
+def moved_by(action: bpy.types.Action, owner: Posable) -> set[str]:
+    """Names of the bones that an action moves, or of the shape keys if the owner has these."""
     if bpy.app.version < (4, 4, 0):
         curves = list(action.fcurves)
     else:
         bags = (bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags)
         curves = [curve for bag in bags for curve in bag.fcurves]
-    matches = (BONE.match(curve.data_path) for curve in curves)
+    matches = (MOVED[type(owner)].match(curve.data_path) for curve in curves)
     return {bpy.utils.unescape_identifier(match[1]) for match in matches if match is not None}

@@ -86,7 +86,7 @@ class Character:
                 continue
             if data.action is not None:
                 ranges.append(tuple(data.action.frame_range))
-            for track in data.nla_tracks:
+            for track in data.nla_tracks if data.use_nla else ():
                 if not track.mute:
                     ranges += [(strip.frame_start, strip.frame_end) for strip in track.strips if not strip.mute]
         return ranges
@@ -131,7 +131,10 @@ def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
 def mesh_objects(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
     """The objects with a mesh, ordered by name, except those that only show the shape of a bone."""
     meshes = sorted((obj for obj in objects if obj.type == "MESH"), key=lambda obj: obj.name)
-    return [obj for obj in meshes if not _draws_a_bone(obj)]
+    rigs = [obj for obj in bpy.data.objects if obj.type == "ARMATURE" and obj.pose is not None] if meshes else []
+    shapes = {bone.custom_shape for rig in rigs for bone in rig.pose.bones}
+    # Importers add such objects, alone or under an Empty.
+    return [obj for obj in meshes if obj not in shapes or obj.modifiers or armature_of(obj) is not None]
 
 
 def selected_meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -186,14 +189,6 @@ def why_no_mesh(objects: Iterable[bpy.types.Object]) -> str:
                 '"{name}" is an instance: make it real first (Object > Apply > Make Instances Real)', name=obj.name
             )
     return "Select the mesh of a character first"
-
-
-def _draws_a_bone(obj: bpy.types.Object) -> bool:
-    """Whether an object only shows the shape of a bone, as importers add such objects, alone or under an Empty."""
-    if obj.modifiers or armature_of(obj) is not None:
-        return False
-    rigs = [other for other in bpy.data.objects if other.type == "ARMATURE" and other.pose is not None]
-    return any(bone.custom_shape == obj for rig in rigs for bone in rig.pose.bones)
 
 
 def group(objects: Sequence[bpy.types.Object], together: bool = False) -> list[Character]:

@@ -1,30 +1,33 @@
-"""The pose and the animation of an armature, kept while others are tried."""
+"""The pose and the animation of an armature or of shape keys, kept while others are tried."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeAlias
 
 import bpy
 from mathutils import Matrix
 
+Posable: TypeAlias = bpy.types.Object | bpy.types.Key
+"""An armature, or the shape keys of a mesh."""
+
 
 class KeptPose:
-    """What an armature has at the moment: its action, and the pose of its bones with all that has no keyframes."""
+    """What an armature or shape keys have at the moment: their action, and all values that have no keyframes."""
 
-    def __init__(self, armature: bpy.types.Object) -> None:
-        self._armature, data = armature, armature.animation_data
+    def __init__(self, owner: Posable) -> None:
+        self._owner, data = owner, owner.animation_data
         self._animation = (
             {name: getattr(data, name, None) for name in ("action", "action_slot", "use_nla")} if data else {}
         )
-        self._bones = [(bone, _state(bone), dict(bone.items())) for bone in armature.pose.bones]
+        self._parts = [(part, _state(part), _properties(part)) for part in parts_of(owner)]
 
     def restore(self, context: bpy.types.Context) -> None:
-        """Give the armature its action and its pose back."""
-        data = self._armature.animation_data
+        """Give back the action and the pose."""
+        data = self._owner.animation_data
         if data is not None and not self._animation:
-            self._armature.animation_data_clear()
+            self._owner.animation_data_clear()
         elif data is not None:
             data.action = self._animation["action"]
             for name in ("action_slot", "use_nla"):
@@ -32,38 +35,52 @@ class KeptPose:
                     setattr(data, name, self._animation[name])
         # Evaluate keyframes now, so that they do not overwrite what is restored next.
         context.view_layer.update()
-        for bone, state, properties in self._bones:
+        for part, state, properties in self._parts:
             for name, value in state.items():
-                setattr(bone, name, value)
+                setattr(part, name, value)
             for name, value in properties.items():
-                bone[name] = value
+                part[name] = value
         context.view_layer.update()
 
 
 @contextmanager
-def kept_pose(context: bpy.types.Context, armature: bpy.types.Object) -> Iterator[KeptPose]:
-    """Restore the pose and the animation of an armature after the block."""
-    kept = KeptPose(armature)
+def kept_pose(context: bpy.types.Context, owner: Posable) -> Iterator[KeptPose]:
+    """Restore the pose and the animation of an armature or of shape keys after the block."""
+    kept = KeptPose(owner)
     try:
         yield kept
     finally:
         kept.restore(context)
 
 
-def to_rest(armature: bpy.types.Object) -> None:
-    """Put all bones of an armature at rest: an action leaves those as they are that it does not move."""
-    for bone in armature.pose.bones:
-        bone.matrix_basis = Matrix()
+def parts_of(owner: Posable) -> bpy.types.bpy_prop_collection:
+    """The bones of an armature, or the shape keys."""
+    return owner.pose.bones if isinstance(owner, bpy.types.Object) else owner.key_blocks
 
 
-def _state(bone: bpy.types.PoseBone) -> dict[str, Any]:
-    """All properties of a bone that can be animated.
+def to_rest(owner: Posable) -> None:
+    """Put all bones at rest, or all shape keys at zero: an action leaves those as they are that it does not move."""
+    for part in parts_of(owner):
+        if isinstance(part, bpy.types.PoseBone):
+            part.matrix_basis = Matrix()
+        else:
+            part.value = 0.0
 
-    The rotation mode is the first one to be restored, since Blender converts the other properties when it is set.
+
+def _properties(part: bpy.types.PoseBone | bpy.types.ShapeKey) -> dict[str, Any]:
+    """Custom properties, which shape keys do not have."""
+    return dict(part.items()) if isinstance(part, bpy.types.PoseBone) else {}
+
+
+def _state(part: bpy.types.PoseBone | bpy.types.ShapeKey) -> dict[str, Any]:
+    """All properties that can be animated.
+
+    The rotation mode of a bone is the first one to be restored, since Blender converts the other properties when it is
+    set.
     """
-    state: dict[str, Any] = {"rotation_mode": bone.rotation_mode}
-    for prop in bone.bl_rna.properties:
+    state: dict[str, Any] = {"rotation_mode": part.rotation_mode} if isinstance(part, bpy.types.PoseBone) else {}
+    for prop in part.bl_rna.properties:
         if prop.is_animatable and not prop.is_readonly and prop.type in ("FLOAT", "INT", "BOOLEAN"):
-            value = getattr(bone, prop.identifier)
+            value = getattr(part, prop.identifier)
             state[prop.identifier] = tuple(value) if prop.is_array else value
     return {name: value for name, value in state.items() if not name.startswith("matrix")}

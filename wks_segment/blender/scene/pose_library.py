@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import bpy
 
 from ..errors import UserError
-from .actions import armature_with_bones, bones_of
+from .actions import armature_with_bones, moved_by
 from .characters import Character
 from .kept_pose import kept_pose, to_rest
 from .poses import Pose, evenly, read_pose, with_rest
@@ -30,7 +30,7 @@ def read_actions(context: bpy.types.Context, character: Character, count: int) -
         raise UserError(
             '"{name}" has no armature that a pose could move: take poses from elsewhere', name=character.name
         )
-    actions = [action for action in bpy.data.actions if bones_of(action) & set(armature.pose.bones.keys())]
+    actions = [action for action in bpy.data.actions if moved_by(action, armature) & set(armature.pose.bones.keys())]
     actions = [action for action in actions if action.asset_data is not None] or actions
     if not actions:
         raise UserError(

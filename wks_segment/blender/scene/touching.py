@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import bpy
 import numpy as np
 from mathutils.bvhtree import BVHTree
 
-from ...core.mesh.triangle_mesh import FloatArray
+from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ...core.message import Message
 from .characters import Character, armature_of, quoted
 from .motion import evaluated_surface
@@ -32,7 +33,7 @@ class _Body:
 
     character: Character
     points: FloatArray
-    tree: BVHTree | None
+    triangles: IntArray
     collections: set[bpy.types.Collection]
     armatures: set[bpy.types.Object]
     low: FloatArray = field(init=False)
@@ -40,6 +41,11 @@ class _Body:
 
     def __post_init__(self) -> None:
         self.low, self.high = self.points.min(axis=0), self.points.max(axis=0)
+
+    @cached_property
+    def tree(self) -> BVHTree:
+        """Finds what is near; made for bodies whose boxes are near others only."""
+        return BVHTree.FromPolygons(self.points.tolist(), self.triangles.tolist())
 
     @property
     def size(self) -> float:
@@ -84,7 +90,7 @@ def _body(character: Character, depsgraph: bpy.types.Depsgraph) -> _Body | None:
     return _Body(
         character,
         points,
-        BVHTree.FromPolygons(points.tolist(), triangles.tolist()),
+        triangles,
         {collection for obj in objects for collection in obj.users_collection},
         {armature for armature in map(armature_of, objects) if armature is not None},
     )
@@ -98,7 +104,9 @@ def _may_join(one: list[_Body], other: list[_Body]) -> bool:
 
 
 def _is_twice(a: _Body, b: _Body) -> bool:
-    """Whether two bodies are the same thing twice at one place."""
+    """Whether two bodies are the same thing twice: they share a mesh, as poses may, or lie at one place."""
+    if set(a.character.meshes) & set(b.character.meshes):
+        return True
     common = np.prod(np.maximum(np.minimum(a.high, b.high) - np.maximum(a.low, b.low), 0))
     both = np.prod(a.high - a.low) + np.prod(b.high - b.low) - common
     ours, theirs = a.character.objects, b.character.objects
@@ -113,8 +121,6 @@ def _touch(a: _Body, b: _Body) -> bool:
     near = TOUCH * min(a.size, b.size)
     if np.any(a.low > b.high + near) or np.any(b.low > a.high + near) or _is_ground(a, b) or _is_ground(b, a):
         return False
-    assert a.tree is not None
-    assert b.tree is not None
     if a.tree.overlap(b.tree):
         return True
     pairs = ((a.points, b.tree), (b.points, a.tree))

@@ -17,7 +17,7 @@ from ..errors import UserError
 from ..props.settings import WKSSegmentSettings
 from ..scene import poses as reader
 from ..scene.change_guard import ChangeGuard
-from ..scene.characters import Character, group, mesh_objects, selected_meshes
+from ..scene.characters import Character, evaluated_objects, group, mesh_objects, quoted, selected_meshes
 from ..scene.pose_sources import read_training_poses
 from ..scene.poses import Pose
 from ..scene.simulations import check_simulations
@@ -105,6 +105,12 @@ class SegmentationJob:
         model.smoothness = settings.smoothness
         with report.stage("read"):
             chosen = mesh_objects(objects) if objects else selected_meshes(context)
+            disabled = [obj.name for obj in chosen if obj not in evaluated_objects(context.view_layer)]
+            if disabled:
+                raise UserError(
+                    "{names} is disabled in viewports, or its collection is disabled or excluded: enable it first",
+                    names=quoted(disabled),
+                )
             characters = group(chosen, together=settings.one_character)
             check_simulations(context.scene, characters, over_time=False)
             report.poses = reader.read_objects(context, characters)
