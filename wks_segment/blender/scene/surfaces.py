@@ -135,7 +135,7 @@ def _origin_of_faces(obj: bpy.types.Object, mesh: bpy.types.Mesh, origins: Origi
             "simulation: bake the simulation first",
             pose=pose, object=obj.name,
         )  # fmt: skip
-    if obj.data in origins.marks:
+    if obj.data in origins.marks and not any(modifier.type == "MESH_SEQUENCE_CACHE" for modifier in obj.modifiers):
         raise UserError(
             '"{pose}": a modifier of "{object}" such as Remesh makes faces that cannot be traced to the mesh: apply '
             "it, or turn it off",
