@@ -233,6 +233,41 @@ def test_command_line_takes_the_action_that_moves_most_unless_one_is_named(comma
     assert np.unique(labels_of(bpy.data.objects["Walker"])).size == 4
 
 
+def test_the_place_of_the_armature_comes_back_and_actions_of_another_rig_are_not_tried(frames):
+    obj, other = limbed_rigged(bends=((1, 0.2), (11, 0.2))), walker("Other", 9)
+    armature = obj.parent
+    armature.animation_data.action.name = "Hold"
+    jump = action_of(armature, "Jump", 0.0, 0.9)
+    own, armature.animation_data.action = armature.animation_data.action, jump
+    armature.location.z = 5
+    armature.keyframe_insert("location", frame=1)
+    armature.animation_data.action, armature.location.z = own, 0
+    bpy.data.actions.new("Other rig|Dance")
+    track = other.parent.animation_data.nla_tracks.new()
+    track.strips.new("Strip", 1, action_of(other.parent, "Waits in a track", 0.0, 1.5))
+    track.mute = True
+    select(obj)
+    before = pose_snapshot(armature), tuple(armature.location)
+    assert learned(frames)[1] == ['"Walker": the poses are from the action "Jump"; others: "Hold"']
+    assert (pose_snapshot(armature), tuple(armature.location)) == before
+
+
+def test_parts_of_an_animated_parent_are_one_character(frames):
+    root = bpy.data.objects.new("Root", None)
+    bpy.context.scene.collection.objects.link(root)
+    parts = [box(-0.5, 0.5, f"Part {i}") for i in range(3)]
+    for i, part in enumerate(parts):
+        part.parent, part.location.z = root, 9 * i
+    for frame, x in ((1, 0), (21, 3)):
+        root.location.x = x
+        root.keyframe_insert("location", frame=frame)
+    select(*parts)
+    report = Report([])
+    poses = read_training_poses(bpy.context, frames, report)
+    assert [len(pose.character.objects) for pose in poses] == [3, 3, 3]
+    assert [pose.name for pose in poses] == ["Part 0, frame 4", "Part 0, frame 11", "Part 0, frame 18"]
+
+
 def test_an_error_while_frames_are_read_gives_the_action_back(frames):
     obj = limbed_rigged(bends=((1, 0.2), (11, 0.2)))
     action_of(obj.parent, "Wave", 0.0, 0.9, -0.5)

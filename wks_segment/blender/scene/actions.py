@@ -32,16 +32,32 @@ def armature_with_bones(character: Character) -> bpy.types.Object | None:
 
 
 def actions_for(owner: Posable) -> list[bpy.types.Action]:
-    """The actions in this file that move bones of an armature, or shape keys, and are not assigned to another one."""
-    others = [obj for obj in bpy.data.objects if obj.type == "ARMATURE"] + list(bpy.data.shape_keys)
-    taken = {_action(other) for other in others if other != owner} - {_action(owner)}
+    """The actions in this file that move bones of an armature, or shape keys, and do not belong to another one."""
+    others = [other for other in (*bpy.data.objects, *bpy.data.shape_keys) if other != owner]
+    taken = set().union(*map(_own_actions, others)) - _own_actions(owner)
+    rigs = {other.name for other in others if isinstance(other, bpy.types.Object) and other.type == "ARMATURE"}
     parts = set(parts_of(owner).keys())
     found = []
     for action in bpy.data.actions:
         moved = moved_by(action, owner)
-        if action not in taken and moved and len(moved & parts) >= LEAST_SHARE_KNOWN * len(moved):
+        # The importer of FBX names actions after the armature: "Fox|Run".
+        is_free = action not in taken and action.name.partition("|")[0] not in rigs
+        if (
+            (is_free or action in _own_actions(owner))
+            and moved
+            and len(moved & parts) >= LEAST_SHARE_KNOWN * len(moved)
+        ):
             found.append(action)
     return found
+
+
+def _own_actions(owner: bpy.types.ID) -> set[bpy.types.Action]:
+    """The actions that are assigned to something, or wait in its NLA tracks."""
+    data = owner.animation_data
+    if data is None:
+        return set()
+    strips = {strip.action for track in data.nla_tracks for strip in track.strips}
+    return ({data.action} | strips) - {None}
 
 
 def assign_action(owner: bpy.types.ID, action: bpy.types.Action) -> None:
@@ -83,17 +99,19 @@ def acting(
         bending: dict[bpy.types.Action | None, float] = {own: motion.bending}
         if not (keeps_moving and motion.is_bent):
             for action in actions:
+                kept.restore(context)
                 if action not in bending and _acts(owner, action):
                     bending[action] = motions(context, [character], frames_of)[0].bending
         best = max(bending, key=bending.__getitem__)  # the assigned one, if all are static
+        kept.restore(context)
         if best != own:
             _acts(owner, best)
-        elif len(bending) > 1:
-            kept.restore(context)
         yield [_note(character, best, [action for action in actions if action != best])]
 
 
 def _note(character: Character, action: bpy.types.Action | None, others: list[bpy.types.Action]) -> Message:
+    if action is not None and not others:
+        return Message('"{name}": the poses are from the action "{action}"', name=character.name, action=action.name)
     names = ", ".join(f'"{other.name}"' for other in others[:NAMED]) + " …" * (len(others) > NAMED)
     if action is None:
         return Message(

@@ -92,10 +92,14 @@ class Character:
         return ranges
 
     def animated(self) -> list[bpy.types.ID]:
-        """Data-blocks with the character's animation: objects, armatures, shape keys."""
+        """Data-blocks with the character's animation: objects, armatures, shape keys, and parents of these."""
         blocks: dict[bpy.types.ID, None] = {}
         for obj in self.objects:
             blocks |= dict.fromkeys(b for b in (armature_of(obj), obj, obj.data.shape_keys) if b is not None)
+            for child in (obj, armature_of(obj)):
+                parent = None if child is None else child.parent
+                while parent is not None:
+                    blocks[parent], parent = None, parent.parent
         return list(blocks)
 
 

@@ -13,6 +13,10 @@ Posable: TypeAlias = bpy.types.Object | bpy.types.Key
 """An armature, or the shape keys of a mesh."""
 
 
+TRANSFORM = ("rotation_mode", "location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
+"""Properties of an armature's object that actions move as well."""
+
+
 class KeptPose:
     """What an armature or shape keys have at the moment: their action, and all values that have no keyframes."""
 
@@ -21,7 +25,8 @@ class KeptPose:
         self._animation = (
             {name: getattr(data, name, None) for name in ("action", "action_slot", "use_nla")} if data else {}
         )
-        self._parts = [(part, _state(part), _properties(part)) for part in parts_of(owner)]
+        moved = [owner, *parts_of(owner)] if isinstance(owner, bpy.types.Object) else parts_of(owner)
+        self._parts = [(part, _state(part), _properties(part)) for part in moved]
 
     def restore(self, context: bpy.types.Context) -> None:
         """Give back the action and the pose."""
@@ -67,20 +72,25 @@ def to_rest(owner: Posable) -> None:
             part.value = 0.0
 
 
-def _properties(part: bpy.types.PoseBone | bpy.types.ShapeKey) -> dict[str, Any]:
-    """Custom properties, which shape keys do not have."""
+def _properties(part: bpy.types.bpy_struct) -> dict[str, Any]:
+    """Custom properties of a bone."""
     return dict(part.items()) if isinstance(part, bpy.types.PoseBone) else {}
 
 
-def _state(part: bpy.types.PoseBone | bpy.types.ShapeKey) -> dict[str, Any]:
-    """All properties that can be animated.
+def _state(part: bpy.types.bpy_struct) -> dict[str, Any]:
+    """All properties of a bone or a shape key that can be animated, or the transform of an object.
 
-    The rotation mode of a bone is the first one to be restored, since Blender converts the other properties when it is
-    set.
+    The rotation mode is the first one to be restored, since Blender converts the other properties when it is set.
     """
+    if isinstance(part, bpy.types.Object):
+        return {name: _plain(getattr(part, name)) for name in TRANSFORM}
     state: dict[str, Any] = {"rotation_mode": part.rotation_mode} if isinstance(part, bpy.types.PoseBone) else {}
     for prop in part.bl_rna.properties:
         if prop.is_animatable and not prop.is_readonly and prop.type in ("FLOAT", "INT", "BOOLEAN"):
-            value = getattr(part, prop.identifier)
-            state[prop.identifier] = tuple(value) if prop.is_array else value
+            state[prop.identifier] = _plain(getattr(part, prop.identifier))
     return {name: value for name, value in state.items() if not name.startswith("matrix")}
+
+
+def _plain(value: Any) -> Any:
+    """A copy of a value that does not follow the property."""
+    return value if isinstance(value, int | float | str) else tuple(value)
