@@ -105,7 +105,8 @@ class SegmentationJob:
         model.smoothness = settings.smoothness
         with report.stage("read"):
             chosen = mesh_objects(objects) if objects else selected_meshes(context)
-            disabled = [obj.name for obj in chosen if obj not in evaluated_objects(context.view_layer)]
+            evaluated = evaluated_objects(context.view_layer)
+            disabled = [obj.name for obj in chosen if obj not in evaluated]
             if disabled:
                 raise UserError(
                     "{names} is disabled in viewports, or its collection is disabled or excluded: enable it first",
