@@ -155,9 +155,8 @@ def cached(characters: list[Path], output: Path) -> None:
     import bpy
 
     import wks_segment.blender
-    from wks_segment.blender.cli.reading import characters_in
     from wks_segment.blender.cli.terminal import only_result_on_stdout
-    from wks_segment.blender.scene.characters import mesh_objects
+    from wks_segment.blender.scene.characters import group, mesh_objects
     from wks_segment.blender.scene.file_formats import open_files
     from wks_segment.blender.scene.poses import own_frames, read_frames
     from wks_segment.blender.workflow import pipeline
@@ -175,7 +174,7 @@ def cached(characters: list[Path], output: Path) -> None:
             (objects,) = open_files([path])
             if not mesh_objects(objects):
                 continue
-            (character,) = characters_in(path, objects, None)
+            character = group(mesh_objects(objects), together=True)[0]
             frames = own_frames(bpy.context.scene, character, CACHED_FRAMES)
             poses = read_frames(bpy.context, character, frames)
         seconds = []

@@ -72,7 +72,7 @@ def run() -> dict[str, dict[str, float]]:
         return result
 
     model = settings.new_model()
-    poses = timed("read", read_training_poses, bpy.context, settings)
+    poses = timed("read", read_training_poses, bpy.context, settings, Report([]))
     described = timed("connect, eigenpairs, signature", pipeline.describe, model, poses, job)
     timed("mixture", model.fit, described)
     request = timed("read meshes", LabelRequest.of, settings, [pose.character for pose in poses])

@@ -57,7 +57,7 @@ def agreements(path: Path) -> list[float]:
     for obj in objects:
         obj.select_set(obj.type == "MESH")
     settings = bpy.context.scene.wks_segment
-    poses = read_training_poses(bpy.context, settings)
+    poses = read_training_poses(bpy.context, settings, Report([]))
     polygons, rest = [pose.polygon_of for pose in poses], poses[0].upright
     eight = settings.new_model()
     described = pipeline.describe(eight, poses, Run(Report([])))

@@ -37,7 +37,7 @@ LAYERS = {
         {"workflow"},
         {"render", "ui"},
         {"operators", "cli"},
-        {"registration"},
+        {"registration", "poses", "characters"},
     ],
 }
 """Lowest layer first. Packages of one layer do not import each other."""
@@ -149,7 +149,7 @@ def trees():
         yield path.relative_to(PACKAGE), tree_of(path)
 
 
-@pytest.mark.parametrize(("name", "most"), [("core", 8), ("blender", 4)])
+@pytest.mark.parametrize(("name", "most"), [("core", 8), ("blender", 5)])
 def test_modules_live_in_packages_by_topic(name, most):
     assert len(list((PACKAGE / name).glob("*.py"))) <= most
 

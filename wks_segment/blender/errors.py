@@ -22,6 +22,10 @@ class TooLargeError(UserError):
     """A job needs more time or memory than the user allows; the message gives the estimate."""
 
 
+class OtherFacesError(UserError):
+    """A character has other faces in a pose than its mesh, or than in its other poses; the message names the pose."""
+
+
 class ChangedError(UserError):
     """The scene has changed since it was read; the message says how."""
 

@@ -238,7 +238,7 @@ def test_faces_that_a_boolean_takes_from_another_object_are_of_no_own_polygon():
 def test_modifier_without_trace_of_origin_is_refused(kind):
     obj = box(name="Statue")
     obj.modifiers.new("Modifier", kind)
-    with pytest.raises(UserError, match=r'"Statue".*modifier.*apply it, or turn it off'):
+    with pytest.raises(UserError, match=r'modifier of "Statue".*apply it, or turn it off'):
         read(obj)
 
 

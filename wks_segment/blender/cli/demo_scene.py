@@ -99,7 +99,7 @@ class Demo:
             "notes": run.report.notes,
             "seconds": rounded_seconds(run.report),
             "agreement": round(float(np.mean(np.array(agreement)[~np.array(is_learned)])), 4),
-            "warnings": [*run.report.warnings, *pose_warnings(poses, from_frames=True)],
+            "warnings": [*run.report.warnings, *pose_warnings(poses, len(poses))],
             "files": {kind: str(path) for kind, path in paths.items()},
         }
 

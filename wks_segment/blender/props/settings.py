@@ -106,6 +106,11 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         ],
         default="FRAMES",
     )
+    one_character: BoolProperty(
+        name="One Character",
+        description="Take the selected objects together as one character in one pose, not each as a pose",
+        default=False,
+    )
     pose_count: IntProperty(
         name="Count",
         description="Number of poses to take, evenly spaced; three to five are enough for most characters",

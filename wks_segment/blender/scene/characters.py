@@ -86,16 +86,20 @@ class Character:
                 continue
             if data.action is not None:
                 ranges.append(tuple(data.action.frame_range))
-            for track in data.nla_tracks:
+            for track in data.nla_tracks if data.use_nla else ():
                 if not track.mute:
                     ranges += [(strip.frame_start, strip.frame_end) for strip in track.strips if not strip.mute]
         return ranges
 
     def animated(self) -> list[bpy.types.ID]:
-        """Data-blocks with the character's animation: objects, armatures, shape keys."""
+        """Data-blocks with the character's animation: objects, armatures, shape keys, and parents of these."""
         blocks: dict[bpy.types.ID, None] = {}
         for obj in self.objects:
             blocks |= dict.fromkeys(b for b in (armature_of(obj), obj, obj.data.shape_keys) if b is not None)
+            for child in (obj, armature_of(obj)):
+                parent = None if child is None else child.parent
+                while parent is not None:
+                    blocks[parent], parent = None, parent.parent
         return list(blocks)
 
 
@@ -131,7 +135,10 @@ def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
 def mesh_objects(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
     """The objects with a mesh, ordered by name, except those that only show the shape of a bone."""
     meshes = sorted((obj for obj in objects if obj.type == "MESH"), key=lambda obj: obj.name)
-    return [obj for obj in meshes if not _draws_a_bone(obj)]
+    rigs = [obj for obj in bpy.data.objects if obj.type == "ARMATURE" and obj.pose is not None] if meshes else []
+    shapes = {bone.custom_shape for rig in rigs for bone in rig.pose.bones}
+    # Importers add such objects, alone or under an Empty.
+    return [obj for obj in meshes if obj not in shapes or obj.modifiers or armature_of(obj) is not None]
 
 
 def selected_meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -153,6 +160,23 @@ def with_rigged(selected: Iterable[bpy.types.Object], visible: Iterable[bpy.type
     return chosen
 
 
+def evaluated_objects(layer: bpy.types.ViewLayer) -> set[bpy.types.Object]:
+    """The objects that Blender evaluates in a view layer: not disabled in viewports, nor in a collection that is.
+
+    Others would have no modifiers, and one shape in all frames. What is only hidden is evaluated.
+    """
+    found: set[bpy.types.Object] = set()
+    collections = [layer.layer_collection]
+    while collections:
+        collection = collections.pop()
+        if collection.collection.hide_viewport:
+            continue
+        if not collection.exclude:
+            found.update(obj for obj in collection.collection.objects if not obj.hide_viewport)
+        collections += collection.children
+    return found
+
+
 def quoted(names: Iterable[str]) -> str:
     """Names in quotes, with commas between them."""
     return ", ".join(f'"{name}"' for name in names)
@@ -171,16 +195,10 @@ def why_no_mesh(objects: Iterable[bpy.types.Object]) -> str:
     return "Select the mesh of a character first"
 
 
-def _draws_a_bone(obj: bpy.types.Object) -> bool:
-    """Whether an object only shows the shape of a bone, as importers add such objects."""
-    if obj.parent is not None or obj.modifiers:
-        return False
-    rigs = [other for other in bpy.data.objects if other.type == "ARMATURE" and other.pose is not None]
-    return any(bone.custom_shape == obj for rig in rigs for bone in rig.pose.bones)
-
-
 def group(objects: Sequence[bpy.types.Object], together: bool = False) -> list[Character]:
-    """Group mesh objects into characters: objects with the same armature or parented to each other are one.
+    """Group mesh objects into characters: those with the same armature or parented to each other are one.
+
+    So are objects without an armature that are parented to one animated object, such as an Empty that is driven.
 
     Parameters
     ----------
@@ -212,11 +230,17 @@ def group(objects: Sequence[bpy.types.Object], together: bool = False) -> list[C
 
 
 def _body_of(obj: bpy.types.Object, among: set[bpy.types.Object]) -> bpy.types.Object:
-    """The armature of an object, else the topmost of its parents that is among the objects, else the object itself."""
+    """The armature of an object, else the topmost of its parents that is among the objects or animated, else itself."""
     armature = armature_of(obj)
     if armature is not None:
         return armature
     body, parent = obj, obj.parent
     while parent is not None:
-        body, parent = (parent if parent in among else body), parent.parent
+        body, parent = (parent if parent in among or _is_animated(parent) else body), parent.parent
     return body if body is obj else _body_of(body, among)
+
+
+def _is_animated(obj: bpy.types.Object) -> bool:
+    """Whether an object has an action or a strip of animation of its own."""
+    data = obj.animation_data
+    return data is not None and (data.action is not None or any(len(track.strips) for track in data.nla_tracks))

@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 
 from ..errors import UserError
+from .off_files import import_off
 
 
 def _import_fbx(path: str) -> None:
@@ -30,9 +31,11 @@ IMPORTERS: dict[str, Callable[[str], object]] = {
     ".blend": _append_blend,
     ".glb": lambda path: bpy.ops.import_scene.gltf(filepath=path),
     ".gltf": lambda path: bpy.ops.import_scene.gltf(filepath=path),
+    ".vrm": lambda path: bpy.ops.import_scene.gltf(filepath=path),
     ".obj": lambda path: bpy.ops.wm.obj_import(filepath=path),
     ".ply": lambda path: bpy.ops.wm.ply_import(filepath=path),
     ".stl": lambda path: bpy.ops.wm.stl_import(filepath=path),
+    ".off": import_off,
     ".fbx": _import_fbx,
     ".abc": lambda path: bpy.ops.wm.alembic_import(filepath=path, as_background_job=False),
     ".usd": lambda path: bpy.ops.wm.usd_import(filepath=path),
@@ -61,7 +64,11 @@ def open_files(paths: list[Path]) -> list[list[bpy.types.Object]]:
         if not path.is_file():
             raise UserError("{path}: there is no such file", path=path)
         if path.suffix.lower() not in IMPORTERS:
-            raise UserError("{path}: unknown format; known are {formats}", path=path, formats=", ".join(IMPORTERS))
+            raise UserError(
+                "{path}: unknown format; save it as .glb, .fbx or .blend in the program that made it, or in one that "
+                "opens it. Known are {formats}",
+                path=path, formats=", ".join(IMPORTERS),
+            )  # fmt: skip
     if len(paths) == 1 and paths[0].suffix.lower() == ".blend":
         _try(lambda path: bpy.ops.wm.open_mainfile(filepath=path, load_ui=False), paths[0])
         if bpy.context.object is not None and bpy.context.object.mode != "OBJECT":

@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import bpy
 
 from ..errors import UserError
 from ..props.settings import WKSSegmentSettings
 from . import poses
+from .animation import Choice, animated
 from .characters import Character, armature_of, group, selected_meshes
 from .pose_library import read_actions
 from .poses import Pose
+from .simulations import check_simulations
+from .touching import joined
 
 
-def read_training_poses(context: bpy.types.Context, settings: WKSSegmentSettings) -> list[Pose]:
+class Told(Protocol):
+    """What is told of the poses that were read: a report."""
+
+    choices: list[str]
+    warnings: list[str]
+
+
+def read_training_poses(context: bpy.types.Context, settings: WKSSegmentSettings, told: Told) -> list[Pose]:
     """Poses to learn from, read from the source that the settings name.
 
     Raises
@@ -22,17 +33,32 @@ def read_training_poses(context: bpy.types.Context, settings: WKSSegmentSettings
     UserError
         If there are no poses, or they cannot be used.
     """
-    characters = group(selected_meshes(context))
-    if settings.source == "OBJECTS":
+    scene, source = context.scene, settings.source
+    selected = selected_meshes(context)
+    if source == "OBJECTS":
+        characters = group(selected, together=settings.one_character)
+        check_simulations(scene, characters, over_time=False)
         return poses.read_objects(context, characters)
-    character = active_character(context, characters)
-    if settings.source == "SHAPE_KEYS":
-        return poses.read_shape_keys(context, character, settings.pose_count)
-    if settings.source == "MARKERS":
-        return poses.read_markers(context, character, settings.pose_count)
-    if settings.source == "ACTIONS":
-        return read_actions(context, character, settings.pose_count)
-    return poses.read_frames(context, character, chosen_frames(context.scene, character, settings))
+    characters = group(selected)
+    check_simulations(scene, characters, over_time=source in ("FRAMES", "MARKERS"))
+    if source in ("SHAPE_KEYS", "ACTIONS"):
+        characters, notes = joined(context, characters)
+        told.choices += notes
+        read = poses.read_shape_keys if source == "SHAPE_KEYS" else read_actions
+        return read(context, active_character(context, characters), settings.pose_count)
+
+    def frames_of(character: Character) -> list[int]:
+        if source == "MARKERS":
+            return list(poses.marked_frames(scene, settings.pose_count))
+        return chosen_frames(scene, character, settings)
+
+    active = frozenset(obj for obj in (context.active_object,) if obj is not None)
+    choice = Choice(chosen=active, actions=source == "FRAMES", keeps_moving=True)
+    with animated(context, characters, frames_of, choice) as found:
+        told.choices += found.notes
+        character = active_character(context, found.characters)
+        names = list(poses.marked_frames(scene, settings.pose_count).values()) if source == "MARKERS" else None
+        return poses.read_frames(context, character, frames_of(character), names, told.warnings)
 
 
 def active_character(context: bpy.types.Context, characters: Sequence[Character]) -> Character:

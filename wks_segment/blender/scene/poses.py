@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
 from ...core import TriangleMesh
+from ...core.mesh.symmetry import upright_axes
 from ...core.mesh.triangle_mesh import FloatArray, IntArray, repeats_a_vertex
 from ...core.message import Message, message_of
-from ..errors import UserError
-from .attributes import new_attribute, read_floats, read_ints
+from ..errors import OtherFacesError, UserError
+from .bone_sides import left_by_bones
 from .characters import Character, armature_of, polygon_ranges, quoted, vertex_ranges
+from .simulations import must_not_change
+from .surfaces import DEFORMING, origins_of, read_surface
 
-ORIGIN = ".wks_segment_origin"
-"""Temporary face attribute with the number of each face: modifiers copy it to the faces that they make of a face."""
-DEFORMING = frozenset({
-    "ARMATURE", "CAST", "CLOTH", "CORRECTIVE_SMOOTH", "CURVE", "DISPLACE", "HOOK", "LAPLACIANDEFORM", "LATTICE",
-    "MESH_CACHE", "MESH_DEFORM", "MESH_SEQUENCE_CACHE", "NORMAL_EDIT", "SHRINKWRAP", "SIMPLE_DEFORM", "SMOOTH",
-    "LAPLACIANSMOOTH", "SOFT_BODY", "SURFACE_DEFORM", "WARP", "WAVE", "WEIGHTED_NORMAL",
-})  # fmt: skip
-"""Modifiers that only move vertices, so that faces keep their numbers."""
 SAME_SURFACE = 1e-5
 """Two poses are the same if no vertex moves by more than this fraction of the character's size; rounding of single
 precision is below it."""
@@ -52,7 +46,9 @@ class Pose:
         The character's own vertex that each vertex of `mesh` is, numbered like polygons, one object after another; −1
         on objects whose modifiers change faces: there, only `polygon_of` connects the pose with the character.
     axes : (3, 3) array
-        The character's own x, y and z axes in world space, as columns. x points to its left.
+        The character's own x, y and z axes in world space, as columns. x usually points to its left.
+    left : (3,) array, optional
+        Direction in world space from bones with names on the right to bones with names on the left, if there are any.
     rest : TriangleMesh, optional
         The same triangles in the rest position of the character's armature, if it has one: there
         islands lie where the artist has placed them. The axes are then those of the rest position.
@@ -64,13 +60,15 @@ class Pose:
     polygon_of: IntArray
     vertex_of: IntArray
     axes: FloatArray
+    left: FloatArray | None = None
     rest: TriangleMesh | None = None
 
     @property
     def upright(self) -> TriangleMesh:
-        """The rest position, or the pose if there is none, in the character's own axes: x points to its left."""
+        """The rest position, or the pose if there is none, turned so that it is symmetric in x, which points left."""
         mesh = self.mesh if self.rest is None else self.rest
-        return TriangleMesh(mesh.vertices @ self.axes, mesh.faces)
+        axes = upright_axes(mesh, self.axes, () if self.left is None else (self.left,))
+        return TriangleMesh(mesh.vertices @ axes, mesh.faces)
 
     def is_like(self, other: Pose) -> bool:
         """Whether the other pose is the same surface at the same place."""
@@ -112,38 +110,85 @@ def read_objects(context: bpy.types.Context, characters: Sequence[Character]) ->
 
 
 def read_frames(
-    context: bpy.types.Context, character: Character, frames: Sequence[int], names: Sequence[str] | None = None
-) -> list[Pose]:
-    """A character at frames of its animation, with these names; the scene is at its own frame again afterward."""
+    context: bpy.types.Context, character: Character, frames: Sequence[int], names: Sequence[str] | None = None,
+    left_out: list[str] | None = None,
+) -> list[Pose]:  # fmt: skip
+    """A character at frames of its animation, with these names; the scene is at its own frame again afterward.
+
+    Parameters
+    ----------
+    context
+    character
+    frames
+    names : optional
+        A name for each frame.
+    left_out : list, optional
+        Gets a message for each frame in which the character has other faces, which is then left out.
+
+    Raises
+    ------
+    UserError
+        If a frame cannot be read, or all would be left out.
+    """
     scene = context.scene
     before, subframe = scene.frame_current, scene.frame_subframe
+    names = names or [Message("frame {frame}", frame=frame) for frame in frames]
+    poses: list[Pose] = []
+    refused: list[Message] = []
     try:
-        poses = []
-        for frame, name in zip(
-            frames, names or [Message("frame {frame}", frame=frame) for frame in frames], strict=True
-        ):
+        for frame, name in zip(frames, names, strict=True):
             scene.frame_set(frame)
-            poses.append(read_pose(context, character, _named(character, name)))
+            try:
+                poses.append(read_pose(context, character, _named(character, name)))
+            except OtherFacesError as error:
+                refused.append(message_of(error))
+        poses = _with_same_faces(poses, refused)
+        if refused and (left_out is None or not poses):
+            raise OtherFacesError(refused[0])
+        if left_out is not None:
+            left_out += refused
         return with_rest(context, poses)
     finally:
         scene.frame_set(before, subframe=subframe)
 
 
-def read_markers(context: bpy.types.Context, character: Character, count: int) -> list[Pose]:
-    """A character at the frames of at most `count` markers of the timeline, evenly chosen.
+def _with_same_faces(poses: list[Pose], refused: list[Message]) -> list[Pose]:
+    """The poses with the faces that most of them have, if nodes change the faces; messages on the others are added.
 
-    Raises
-    ------
-    UserError
-        If there are no markers.
+    Other modifiers may change faces: those of Decimate depend on the pose, and are traced.
     """
+    objects = poses[0].character.objects if poses else ()
+    making = {m.type for obj in objects for m in obj.modifiers if m.show_viewport} - DEFORMING
+    if making != {"NODES"}:
+        return poses
+    alike = [[pose.triangulated_as(other).is_mesh_of(other) for pose in poses] for other in poses]
+    most = max(alike, key=sum)
+    first = poses[most.index(True)]
+    refused += [
+        Message(
+            '"{pose}": {names} has other faces there than in "{first}": its nodes change them from frame to frame. '
+            "Take frames in which the faces stay the same, or turn the nodes off",
+            pose=pose.name, names=quoted(obj.name for obj in objects), first=first.name,
+        )
+        for pose, is_alike in zip(poses, most, strict=True) if not is_alike
+    ]  # fmt: skip
+    return [pose for pose, is_alike in zip(poses, most, strict=True) if is_alike]
+
+
+def marked_frames(scene: bpy.types.Scene, count: int) -> dict[int, str]:
+    """Name by frame of at most `count` markers of the timeline, evenly chosen; UserError if there are none."""
     names: dict[int, str] = {}
-    for marker in sorted(context.scene.timeline_markers, key=lambda marker: marker.frame):
+    for marker in sorted(scene.timeline_markers, key=lambda marker: marker.frame):
         names.setdefault(marker.frame, marker.name)
     if not names:
         raise UserError("There are no markers in the timeline: add some (M), or take poses from elsewhere")
-    frames = [list(names)[i] for i in evenly(0, len(names) - 1, count)]
-    return read_frames(context, character, frames, [names[frame] for frame in frames])
+    return {frame: names[frame] for frame in [list(names)[i] for i in evenly(0, len(names) - 1, count)]}
+
+
+def read_markers(context: bpy.types.Context, character: Character, count: int) -> list[Pose]:
+    """A character at the frames of at most `count` markers; UserError if there are none."""
+    names = marked_frames(context.scene, count)
+    return read_frames(context, character, list(names), list(names.values()))
 
 
 def read_shape_keys(context: bpy.types.Context, character: Character, count: int) -> list[Pose]:
@@ -205,11 +250,14 @@ def in_one_triangulation(poses: Sequence[Pose]) -> list[Pose]:
 
 
 def with_rest(context: bpy.types.Context, poses: list[Pose]) -> list[Pose]:
-    """Poses of one character with its rest position, if it has an armature and the same polygons at rest."""
+    """Poses of one character with its rest position, if it has an armature and the same polygons at rest.
+
+    Without it if a simulation would lose its frames by that.
+    """
     poses = in_one_triangulation(poses)
     character = poses[0].character
     armatures = dict.fromkeys(obj.data for obj in map(armature_of, character.objects) if obj is not None)
-    if not armatures:
+    if not armatures or must_not_change(context.scene, character):
         return poses
     before = {armature: armature.pose_position for armature in armatures}
     try:
@@ -221,7 +269,10 @@ def with_rest(context: bpy.types.Context, poses: list[Pose]) -> list[Pose]:
         for armature, position in before.items():
             armature.pose_position = position
         context.view_layer.update()
-    return [replace(pose, rest=rest.mesh, axes=rest.axes) if pose.is_mesh_of(rest) else pose for pose in poses]
+    return [
+        replace(pose, rest=rest.mesh, axes=rest.axes, left=rest.left) if pose.is_mesh_of(rest) else pose
+        for pose in poses
+    ]
 
 
 def read_pose(context: bpy.types.Context, character: Character, name: str) -> Pose:
@@ -237,10 +288,11 @@ def read_pose(context: bpy.types.Context, character: Character, name: str) -> Po
     owners: list[IntArray] = []
     own: list[IntArray] = []
     n_vertices = 0
-    with _marked_origins(character) as origins:
+    with origins_of(context.scene, character) as origins:
         depsgraph = context.evaluated_depsgraph_get()
         for (obj, polygons), (_, its) in zip(polygon_ranges(character), vertex_ranges(character), strict=True):
-            points, faces, polygon_of, vertex_of = _read_object(obj, depsgraph, origins.get(obj.data))
+            surface = read_surface(obj, depsgraph, origins, name)
+            points, polygon_of, vertex_of = surface.vertices, surface.polygon_of, surface.vertex_of
             bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
             if bad.size:
                 raise UserError(
@@ -249,11 +301,11 @@ def read_pose(context: bpy.types.Context, character: Character, name: str) -> Po
                     pose=name, vertex=bad[0], object=obj.name, count=bad.size,
                 )  # fmt: skip
             vertices.append(points)
-            triangles.append(faces + n_vertices)
+            triangles.append(surface.triangles + n_vertices)
             owners.append(np.where(polygon_of < 0, -1, polygon_of + polygons.start))
             own.append(np.where(vertex_of < 0, -1, vertex_of + its.start))
             n_vertices += len(points)
-        axes = _axes(character, depsgraph)
+        axes, left = _axes(character, depsgraph), left_by_bones(character)
     faces, polygon_of = np.concatenate(triangles), np.concatenate(owners)
     proper = ~repeats_a_vertex(faces)
     if not (proper.any() and (polygon_of >= 0).any()):
@@ -264,7 +316,7 @@ def read_pose(context: bpy.types.Context, character: Character, name: str) -> Po
         mesh = TriangleMesh(np.concatenate(vertices), faces[proper])
     except ValueError as error:
         raise UserError('"{name}": {reason}', name=name, reason=message_of(error)) from error
-    return Pose(name, character, mesh, polygon_of[proper], np.concatenate(own), axes)
+    return Pose(name, character, mesh, polygon_of[proper], np.concatenate(own), axes, left)
 
 
 def _named(character: Character, name: str) -> Message:
@@ -281,64 +333,3 @@ def _axes(character: Character, depsgraph: bpy.types.Depsgraph) -> FloatArray:
     body = armatures[0] if armatures else max(character.objects, key=lambda obj: len(obj.data.polygons))
     # A quaternion knows no mirroring: of a mirrored object, what is seen on the left is left.
     return np.array(body.evaluated_get(depsgraph).matrix_world.to_quaternion().to_matrix(), dtype=np.float64)
-
-
-def _read_object(
-    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, origin_name: str | None
-) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
-    """The surface of an object: vertices in world space, triangles, and where they come from.
-
-    The third array is the polygon of the object's own mesh that each triangle comes from, the fourth one the own vertex
-    of each vertex; −1 for none and for unknown.
-    """
-    evaluated = obj.evaluated_get(depsgraph)
-    mesh = evaluated.to_mesh()
-    try:
-        mesh.calc_loop_triangles()
-        vertices = read_floats(mesh.vertices, "co", 3).astype(np.float64)
-        triangles = read_ints(mesh.loop_triangles, "vertices", 3)
-        polygon_of = read_ints(mesh.loop_triangles, "polygon_index")
-        same = _has_corners_of(mesh, obj.data)
-        if origin_name is not None and len(mesh.polygons):
-            origin = mesh.attributes.get(origin_name)
-            if origin is None:
-                raise UserError(
-                    '"{name}": a modifier such as Remesh makes faces that cannot be traced to the mesh: apply it, or '
-                    "turn it off",
-                    name=obj.name,
-                )
-            polygons = read_ints(origin.data, "value") - 1
-            same &= np.array_equal(polygons, np.arange(len(obj.data.polygons)))
-            polygon_of = polygons[polygon_of]
-        world = np.array(evaluated.matrix_world, dtype=np.float64)
-    finally:
-        evaluated.to_mesh_clear()
-    with np.errstate(invalid="ignore", over="ignore"):  # read_pose refuses it
-        vertices = vertices @ world[:3, :3].T + world[:3, 3]
-    vertex_of = np.arange(len(vertices)) if same else np.full(len(vertices), -1)
-    return vertices, triangles, polygon_of, vertex_of
-
-
-def _has_corners_of(mesh: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:
-    """Whether two meshes have the same number of vertices, and their corners the same vertices."""
-    return len(mesh.vertices) == len(other.vertices) and np.array_equal(
-        read_ints(mesh.loops, "vertex_index"), read_ints(other.loops, "vertex_index")
-    )
-
-
-@contextmanager
-def _marked_origins(character: Character) -> Iterator[dict[bpy.types.Mesh, str]]:
-    """Add the number of each face as a temporary attribute to meshes whose modifiers may make faces.
-
-    Numbers start at 1, since faces that a modifier takes from other meshes get 0. Gives the attribute's name by mesh.
-    """
-    meshes = {obj.data for obj in character.objects if any(m.type not in DEFORMING for m in obj.modifiers)}
-    names: dict[bpy.types.Mesh, str] = {}
-    try:
-        for mesh in meshes:
-            names[mesh] = new_attribute(mesh, ORIGIN, "INT", "FACE", np.arange(1, len(mesh.polygons) + 1)).name
-            mesh.update_tag()
-        yield names
-    finally:
-        for mesh, name in names.items():
-            mesh.attributes.remove(mesh.attributes[name])

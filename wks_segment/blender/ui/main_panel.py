@@ -97,8 +97,7 @@ class WKS_SEGMENT_PT_main(_Sidebar, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         settings = self.settings(context, "source")
-        if settings.source != "OBJECTS":
-            self.settings(context, "pose_count")
+        self.settings(context, "one_character" if settings.source == "OBJECTS" else "pose_count")
         if settings.source == "FRAMES":
             self.settings(context, "use_frame_range")
             if settings.use_frame_range:

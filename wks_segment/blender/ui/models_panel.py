@@ -11,7 +11,7 @@ from ..props.preferences import model_folder
 from ..workflow import model_library
 from ..workflow.certainty import is_certainty
 from ..workflow.stored_messages import restored
-from .main_panel import SubPanel, wrapped
+from .main_panel import SIDEBAR_LETTERS, SubPanel, wrapped
 from .messages import in_panel
 
 NO_MODEL = "No model yet:\nselect a character,\nthen Learn and Segment"
@@ -96,9 +96,10 @@ def details(settings: Any) -> list[str]:
         return wrapped(NO_MODEL)
     row = model_library.active_row(settings)
     origin, *others = model_library.summary_of(settings)
-    facts = [text for text in others if not is_certainty(text)]
+    sentences = [text for text in others if is_certainty(text) or len(text) > SIDEBAR_LETTERS]
+    facts = [text for text in others if text not in sentences]
     day = [row.date] if row is not None and row.date else []
-    texts = [origin, Message.joined(" · ", [*facts, *day]), *filter(is_certainty, others)]
+    texts = [origin, Message.joined(" · ", [*facts, *day]), *sentences]
     return [line for text in texts for line in wrapped(text)]
 
 

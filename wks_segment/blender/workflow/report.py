@@ -16,6 +16,8 @@ from ..parts import part_ids
 from ..scene.poses import Pose
 from .certainty import certainties, certainty_lines
 
+ONE_POSE = "Learned from one pose only: segments are more reliable with three to five"
+
 
 @dataclass
 class Report:
@@ -35,8 +37,10 @@ class Report:
         Certainty by number of segments; None if the model tells none.
     seconds
         Time by stage.
-    notes
-        Facts to show.
+    choices
+        What was chosen when the poses were read: characters, actions.
+    curve
+        How certain the model is of each number of segments, in lines.
     warnings
         Problems that did not stop the run.
     """
@@ -47,13 +51,14 @@ class Report:
     parts: dict[str, int] = field(default_factory=dict)
     certainty: dict[int, float] | None = None
     seconds: dict[str, float] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
+    choices: list[str] = field(default_factory=list)
+    curve: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
     def add_model(self, model: PoseSegmentation) -> None:
         """Record how many segments a fitted model has, and how certain it is of each number."""
         self.n_segments, self.certainty = model.n_segments_, certainties(model)
-        self.notes = certainty_lines(model)
+        self.curve = certainty_lines(model)
 
     def add_labels(self, labels: IntArray) -> None:
         """Record which parts occur among labels."""
@@ -64,6 +69,11 @@ class Report:
     def warn(self, text: str) -> None:
         """Add a warning, unless it is there already."""
         self.warnings = list(dict.fromkeys([*self.warnings, text]))
+
+    @property
+    def notes(self) -> list[str]:
+        """Facts to show."""
+        return [*self.choices, *self.curve]
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -97,17 +107,44 @@ def segment_warnings(model: PoseSegmentation, report: Report) -> list[str]:
     ]
 
 
-def pose_warnings(poses: Sequence[Pose], from_frames: bool) -> list[str]:
-    """Warnings that the poses to learn from are too few or all the same."""
-    if len(poses) == 1:
-        return ["Learned from one pose only: segments are more reliable with three to five"]
-    if all(pose.is_like(poses[0]) for pose in poses[1:]):
-        if from_frames:
-            return [
+def pose_warnings(poses: Sequence[Pose], asked: int | None) -> list[str]:
+    """Warnings that the poses to learn from are too few or all the same.
+
+    Parameters
+    ----------
+    poses
+    asked : int or None
+        Number of frames of each character that were asked for; None if the poses are not from an animation.
+    """
+    if asked is None:
+        if len(poses) > 1 and all(pose.is_like(poses[0]) for pose in poses[1:]):
+            return [Message("All {count} poses are the same: pose them differently", count=len(poses))]
+        return [ONE_POSE] if len(poses) == 1 else []
+    warnings: list[str] = []
+    by_character: dict[str, list[Pose]] = {}
+    for pose in poses:
+        by_character.setdefault(pose.character.name, []).append(pose)
+    for name, own in by_character.items():
+        different = sum(not any(pose.is_like(other) for other in own[:i]) for i, pose in enumerate(own))
+        if different == 1 < len(own):
+            warnings.append(_all_the_same(name, len(own), alone=len(by_character) == 1))
+        elif different < asked:
+            warnings.append(
                 Message(
-                    "All {count} poses are the same: does an animation move the character in these frames?",
-                    count=len(poses),
+                    '"{name}": number of different poses is {different}, not {asked}: its animation has no more in '
+                    "these frames",
+                    name=name, different=different, asked=asked,
                 )
-            ]
-        return [Message("All {count} poses are the same: pose them differently", count=len(poses))]
-    return []
+            )  # fmt: skip
+    return [*warnings, ONE_POSE] if len(poses) == 1 else warnings
+
+
+def _all_the_same(name: str, count: int, alone: bool) -> Message:
+    """Warning that a character does not move; with its name if there are others."""
+    if alone:
+        return Message(
+            "All {count} poses are the same: does an animation move the character in these frames?", count=count
+        )
+    return Message(
+        'All {count} poses of "{name}" are the same: does an animation move it in these frames?', count=count, name=name
+    )

@@ -15,7 +15,8 @@ from ..errors import UserError
 from ..props.settings import WKSSegmentSettings
 from ..scene import file_formats
 from ..scene import poses as reader
-from ..scene.characters import group, mesh_objects
+from ..scene.animation import Choice, animated
+from ..scene.characters import Character, group, mesh_objects
 from ..scene.poses import Pose
 from . import pipeline
 from .pipeline import Run
@@ -143,7 +144,12 @@ def _shapes_of(paths: list[Path], report: Report) -> list[Pose]:
 
 
 def _frames_of(path: Path, count: int) -> list[Pose]:
-    """Poses at frames spread evenly over the animation in a file."""
+    """Poses at frames spread evenly over the animation of what moves in a file."""
     (objects,) = file_formats.open_files([path])
-    (character,) = group(mesh_objects(objects), together=True)
-    return reader.read_frames(bpy.context, character, reader.own_frames(bpy.context.scene, character, count))
+
+    def frames_of(character: Character) -> list[int]:
+        return reader.own_frames(bpy.context.scene, character, count)
+
+    with animated(bpy.context, group(mesh_objects(objects)), frames_of, Choice(together=True)) as found:
+        character = found.characters[0]
+        return reader.read_frames(bpy.context, character, frames_of(character))

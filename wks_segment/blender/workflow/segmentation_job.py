@@ -17,9 +17,10 @@ from ..errors import UserError
 from ..props.settings import WKSSegmentSettings
 from ..scene import poses as reader
 from ..scene.change_guard import ChangeGuard
-from ..scene.characters import Character, group, mesh_objects, selected_meshes
+from ..scene.characters import Character, evaluated_objects, group, mesh_objects, quoted, selected_meshes
 from ..scene.pose_sources import read_training_poses
 from ..scene.poses import Pose
+from ..scene.simulations import check_simulations
 from . import model_library, pipeline
 from .pipeline import LabelRequest, Run
 from .report import Report, pose_warnings, segment_warnings
@@ -81,8 +82,10 @@ class SegmentationJob:
         """Read poses and settings to learn from; UserError if they cannot be used."""
         settings, report = context.scene.wks_segment, Report([])
         with report.stage("read"):
-            report.poses = read_training_poses(context, settings)
-        report.warnings += pose_warnings(report.poses, settings.source in ("FRAMES", "MARKERS"))
+            report.poses = read_training_poses(context, settings, report)
+        left_out = len(report.warnings)
+        asked = {"FRAMES": settings.pose_count - left_out, "MARKERS": 1}.get(settings.source)
+        report.warnings += pose_warnings(report.poses, asked)
         return cls._read(context, settings.new_model(), report, cache, learns=True)
 
     @classmethod
@@ -102,7 +105,16 @@ class SegmentationJob:
         model.smoothness = settings.smoothness
         with report.stage("read"):
             chosen = mesh_objects(objects) if objects else selected_meshes(context)
-            report.poses = reader.read_objects(context, group(chosen))
+            evaluated = evaluated_objects(context.view_layer)
+            disabled = [obj.name for obj in chosen if obj not in evaluated]
+            if disabled:
+                raise UserError(
+                    "{names} is disabled in viewports, or its collection is disabled or excluded: enable it first",
+                    names=quoted(disabled),
+                )
+            characters = group(chosen, together=settings.one_character)
+            check_simulations(context.scene, characters, over_time=False)
+            report.poses = reader.read_objects(context, characters)
         return cls._read(context, model, report, cache, learns=False)
 
     @classmethod
@@ -181,7 +193,8 @@ class SegmentationJob:
         if self.learns:
             names = list(dict.fromkeys(pose.character.name for pose in self.poses))
             first_names = ", ".join(names[:3])
-            lines = [Message("From {names}", names=first_names + " …" * (len(names) > 3)), *self.report.facts[:3]]
+            origin = Message("From {names}", names=first_names + " …" * (len(names) > 3))
+            lines = [origin, *self.report.facts[:3], *self.report.choices]
             model_library.keep(settings, self.model, lines, first_names, adds)
         elif self.first is not None:
             # The model is stored with this number of segments, so that applying it again gives the same ones.

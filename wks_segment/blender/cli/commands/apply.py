@@ -48,10 +48,10 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     verdict = {}
     if options.models is None:
         chosen = NamedModel(options.model.stem, model_library.loaded(options.model))
-        poses = read_poses(options, run.report)
+        poses = read_poses(options, run.report, single=False)
     else:
         models = read_models(options.models, run.report)
-        poses = read_poses(options, run.report)
+        poses = read_poses(options, run.report, single=False)
         # Signatures that are computed for the ranking serve to label as well.
         run = replace(run, cache=run.cache or MemoryCache())
         ranking = _rank(models, poses, options, run)

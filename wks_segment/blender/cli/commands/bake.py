@@ -51,7 +51,7 @@ def _bake(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     if options.blend:
         file_formats.check_output(options.blend)
     run = Run(Report([]), progress)
-    poses = read_poses(options, run.report)
+    poses = read_poses(options, run.report, single=False, writes=False)
     settings = settings_from(options)
     characters = list(dict.fromkeys(pose.character for pose in poses))
     present = [labels_on(obj.data) for character in characters for obj in character.objects if len(obj.data.polygons)]

@@ -40,6 +40,7 @@ def _segment(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     if options.model:
         file_formats.check_folder(options.model)
     poses = read_poses(options, run.report)
+    left_out = len(run.report.warnings)
     settings = settings_from(options)
     model = settings.new_model()
     pipeline.check_limits(model, poses, settings)
@@ -53,5 +54,5 @@ def _segment(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     model_library.keep(settings, model, run.report.facts, poses[0].character.name, add=True)
     if options.output:
         file_formats.save_scene(options.output)
-    run.report.warnings += pose_warnings(poses, from_frames=options.frames is not None)
+    run.report.warnings += pose_warnings(poses, None if options.frames is None else options.frames[2] - left_out)
     return result_of(options, run.report)

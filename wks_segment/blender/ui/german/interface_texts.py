@@ -56,6 +56,8 @@ GERMAN_INTERFACE = {
     "Frames of the active character's animation that have a marker": "Frames der Animation des aktiven Charakters, die eine Markierung haben",
     "Pose Library": "Posenbibliothek",
     "Pose assets in this file that move bones of the active character, each from rest; if there are none, the middle frame of each action that moves them": "Posen-Assets dieser Datei, die Knochen des aktiven Charakters bewegen, jedes aus der Ruhepose; gibt es keine, der mittlere Frame jeder Aktion, die sie bewegt",
+    "One Character": "Ein Charakter",
+    "Take the selected objects together as one character in one pose, not each as a pose": "Die ausgewählten Objekte zusammen als einen Charakter in einer Pose nehmen, nicht jedes als Pose",
     "Count": "Anzahl",
     "Number of poses to take, evenly spaced; three to five are enough for most characters": "Anzahl der Posen, die gleichmäßig verteilt genommen werden; drei bis fünf genügen für die meisten Charaktere",
     "Frame Range": "Frame-Bereich",
