@@ -105,3 +105,10 @@ def figure(left=0.0, right=0.0, subdivisions=4):
     x, y, z = points.T
     posed = np.stack([x * np.cos(turn) + z * np.sin(turn), y, z * np.cos(turn) - x * np.sin(turn)], axis=1)
     return TriangleMesh(posed, sphere.faces)
+
+
+def places_on(surface):
+    """(n', 3) vertices of a surface where the original mesh lies, which its own frame moves and scales."""
+    own = surface.to_vertices(surface.mesh.vertices)
+    matrix = np.linalg.lstsq(np.column_stack([own, np.ones(len(own))]), surface.original.vertices, rcond=None)[0]
+    return np.column_stack([surface.mesh.vertices, np.ones(surface.mesh.n_vertices)]) @ matrix

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from shapes import creature, figure, icosphere, together
+from shapes import creature, figure, icosphere, places_on, together
 
 from wks_segment.core import PoseSegmentation, TriangleMesh
 from wks_segment.core.labeling import own_parts as module
@@ -33,7 +33,7 @@ def on_balls(large, small):
     """Log-likelihoods of kinds: one row on the large ball and one on the small ones."""
 
     def log_likelihoods(pose):
-        inside = np.abs(pose.surface.mesh.vertices[:, :1]) < 1.81
+        inside = np.abs(places_on(pose.surface)[:, :1]) < 1.81
         return np.where(inside, np.array([large], dtype=float), np.array([small], dtype=float))
 
     return log_likelihoods
@@ -81,7 +81,7 @@ def test_a_part_is_recognized_by_the_mean_over_all_of_its_faces(workpiece):
     """Faces on one side of each ball are like another kind, but those of the other side are so even more."""
 
     def log_likelihoods(pose):
-        upper = pose.surface.mesh.vertices[:, 2] > 0
+        upper = places_on(pose.surface)[:, 2] > 0
         return np.where(upper[:, None], np.array([[0.0, -10]]), np.array([[-30.0, 0]]))
 
     parts, mesh = parts_of(workpiece, log_likelihoods, traits()), balls()

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from shapes import creature, figure, icosphere
+from shapes import creature, figure, icosphere, places_on
 
 from wks_segment.core import MemoryCache, PoseSegmentation
 from wks_segment.core.learning import part_mixture
@@ -223,7 +223,7 @@ def test_samples_have_the_kind_around_their_vertex():
     mesh = icosphere(2)
     workpiece = Workpiece(PoseSegmentation(**SMALL).describe(mesh))
     upper = (mesh.face_centers[:, 2] > 0).astype(int)
-    height = workpiece.surface.mesh.vertices[:, 2]
+    height = places_on(workpiece.surface)[:, 2]
     vertex = np.flatnonzero(np.abs(height) > 0.35)[::-1]
     given = TrainingSamples(
         workpiece.signature[vertex], np.full(len(vertex), 1 / len(vertex)), np.zeros(len(vertex), dtype=int), vertex,

@@ -13,7 +13,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..mesh.adjacency import FaceAdjacency
-from ..mesh.canonical import Frame
 from ..mesh.surface import Surface, indicator
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray, connected_groups, unique_edges
 from ..progress import Progress
@@ -90,7 +89,7 @@ def smooth_normals(normals: FloatArray, flow: HeatFlow | ShortFlow) -> FloatArra
 def curvature_across(surface: Surface, normals: FloatArray, adjacency: FaceAdjacency) -> FloatArray:
     """(p,) curvature from one face to its neighbor, of a surface of area 1: negative in a crease, 3.5 on a sphere."""
     face_normals = _normalized(surface.to_faces(normals))
-    centers = surface.original.unit_face_centers
+    centers = surface.to_faces(surface.mesh.vertices) / np.sqrt(surface.mesh.area)
     a, b = adjacency.pairs.T
     offset = centers[b] - centers[a]
     squared = np.maximum(np.einsum("ij,ij->i", offset, offset), LEAST_THICKNESS**2)
@@ -110,11 +109,9 @@ def log_thickness(surface: Surface, normals: FloatArray, flows: Flows, progress:
     """
     progress = Progress.of(progress)
     mesh = surface.mesh
-    # The search is approximate along the axes; in the frame of the shape it ends alike for a turned mesh.
-    frame = Frame.of(mesh)
-    places = frame.places(mesh.vertices) / np.sqrt(mesh.area)
+    places = mesh.vertices / np.sqrt(mesh.area)
     stride = max(1, len(places) // MOST_BALLS)
-    points, directions = places[::stride], frame.directions(normals[::stride])
+    points, directions = places[::stride], normals[::stride]
     spacing = np.sqrt(2.3 / len(points))
     tree = cKDTree(points)
     radius = np.full(len(points), LARGEST_RADIUS)

@@ -18,40 +18,49 @@ SLANT = Rotation.from_rotvec((0.6, 0.4, 0.8)).as_matrix()
 """Coordinates are along the principal axes, turned by this: so the vertices of grids and boxes lie at different places
 along each, and cells of cubes do not cut a body along its own axes, where the fast solver was three times less exact on
 a body with its limbs along them."""
+STEP = 2.0**-30
+"""Coordinates are whole multiples of this, in units of the square root of the area: far below what positions are known
+to, and far above rounding, so that a mesh that was turned has the same coordinates to the last bit."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Middle and principal axes of a surface.
+    """Middle, size and principal axes of a surface.
 
     Attributes
     ----------
     middle : (3,) array
     axes : (3, 3) array
-        Columns are the principal axes, the longest first, each in the direction of the thinner and longer end.
+        Columns are the principal axes, right-handed, the longest first. The two across which the surface is most skewed
+        have the direction of the thinner and longer end; a body is not skewed across its mirror plane.
+    unit : float
+        Square root of the area.
     """
 
     middle: FloatArray
     axes: FloatArray
+    unit: float
 
     @classmethod
     def of(cls, mesh: TriangleMesh) -> Frame:
         """Frame of a mesh; a sphere has none of its own, and gets any."""
-        weights = mesh.vertex_areas / mesh.area
+        weights, unit = mesh.vertex_areas / mesh.area, float(np.sqrt(mesh.area))
         middle = weights @ mesh.vertices
-        offset = mesh.vertices - middle
+        offset = (mesh.vertices - middle) / unit
         axes = np.linalg.eigh((offset * weights[:, None]).T @ offset)[1][:, ::-1]
         skewed = weights @ (offset @ axes) ** 3
-        # A symmetric body is not skewed across its mirror plane: there the direction does not matter.
-        return cls(middle, axes * np.where(skewed < 0, -1.0, 1.0))
+        axes = axes * np.where(skewed < 0, -1.0, 1.0)
+        axes[:, np.abs(skewed).argmin()] *= np.sign(np.linalg.det(axes))
+        return cls(middle, axes, unit)
 
     def places(self, points: FloatArray) -> FloatArray:
-        """(k, 3) coordinates of points in the frame, slanted against its axes."""
-        return self.directions(points - self.middle)
+        """(k, 3) coordinates of points in the frame, slanted against its axes, for a surface of area 1."""
+        return in_steps((points - self.middle) / self.unit @ self.axes @ SLANT)
 
-    def directions(self, vectors: FloatArray) -> FloatArray:
-        """(k, 3) components of vectors in the same coordinates."""
-        return np.asarray(vectors @ self.axes @ SLANT)
+
+def in_steps(lengths: FloatArray) -> FloatArray:
+    """Lengths, for a surface of area 1, as whole multiples of `STEP`: sums are exact, and equal ones stay equal."""
+    return np.asarray(np.round(lengths / STEP) * STEP)
 
 
 def spread(mesh: TriangleMesh) -> float:

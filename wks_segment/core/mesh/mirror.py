@@ -122,7 +122,8 @@ def _mirror(mesh: TriangleMesh) -> Mirror | None:
     tree = cKDTree(places)
     best, best_share = None, LEAST_SHARE
     some = slice(None, None, max(1, len(places) // SAMPLED_FACES))
-    for plane in _planes(mesh):
+    frame = Frame.of(mesh)
+    for plane in _planes(mesh, frame):
         if np.average(np.abs(plane.distances(centers)), weights=areas) < OUTSIDE_PLANE * np.sqrt(mesh.area):
             continue
         near = _nearest(tree, plane.images(places[some]), tolerance)[0] < tolerance[some]
@@ -132,10 +133,13 @@ def _mirror(mesh: TriangleMesh) -> Mirror | None:
         image = _mutual(tree, images, tolerance)
         share = float(areas[image >= 0].sum() / areas.sum())
         if share > best_share + 1e-6:
-            best, best_share = (image, images, plane.distances(centers)), share
+            best, best_share = (image, images, plane), share
     if best is None:
         return None
-    image, images, distances = best
+    image, images, plane = best
+    # Which side is the first one depends on the shape alone, too.
+    along = plane.normal @ frame.axes
+    distances = plane.distances(centers) * np.sign(along[np.abs(along).argmax()])
     side = np.where(np.abs(distances) < ON_PLANE * size, 0, np.sign(distances)).astype(np.int64)
     return Mirror(_with_halves(image, tree, images, of_halves), side)
 
@@ -158,7 +162,7 @@ class _Plane:
         return images
 
 
-def _planes(mesh: TriangleMesh) -> list[_Plane]:
+def _planes(mesh: TriangleMesh, frame: Frame) -> list[_Plane]:
     """Planes that may be mirror planes of a mesh: across its coordinate axes, and across its own axes.
 
     The first lie in the middle of its extent. A mirror plane is perpendicular to one of the principal axes; where a
@@ -166,7 +170,6 @@ def _planes(mesh: TriangleMesh) -> list[_Plane]:
     """
     corners = mesh.vertices[np.unique(mesh.faces)]
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
-    frame = Frame.of(mesh)
     places = np.column_stack([mesh.face_centers, np.sqrt(mesh.face_areas)])
     own = [_Plane(axis, float(axis @ frame.middle)) for axis in frame.axes.T]
     return [_Plane(axis, float(axis @ middle)) for axis in np.eye(3)] + [_fitted(plane, places) for plane in own]

@@ -17,7 +17,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from scipy.spatial import cKDTree
 
 from ..message import Message, message_of
-from .canonical import most_spread, order_of_faces, order_of_vertices
+from .canonical import Frame, most_spread, order_of_faces, order_of_vertices
 from .islands import ties_between_islands
 from .mirror import Mirror, mirror_of
 from .repair import caps_of_small_holes, without_spikes
@@ -63,7 +63,8 @@ class Surface:
         The mesh as it was given.
     mesh : TriangleMesh
         The copy: seams welded, every vertex in a face, no spikes, small holes closed, edges short enough, islands
-        tied. The order of its vertices and faces does not depend on that of the original ones.
+        tied. It lies in its own frame, and its vertices and faces are in an order of their own, so that it is the same
+        wherever the original lies and in whatever order it is written.
     vertex_of : (n,) int array
         The vertex of `mesh` that stands for each vertex of `original`: for a vertex without a face or of an island that
         is left out, the nearest one.
@@ -201,7 +202,7 @@ def prepare_surface(
 ) -> Surface:
     """Weld a mesh along its seams, repair it, refine it to at least `min_vertices` vertices, and tie its islands.
 
-    Refinement adds vertices on edges and so does not change the shape.
+    Refinement adds vertices on edges and so does not change the shape, which is moved and scaled to area 1.
 
     Parameters
     ----------
@@ -248,6 +249,7 @@ def prepare_surface(
     ties = compact[connection.ties]
     if len(vertices) > surface.n_vertices or len(ties):
         surface = TriangleMesh(vertices, faces, ties)
+    surface = surface.at(Frame.of(surface).places(surface.vertices))
     return Surface(mesh, surface, vertex_of, face_of, welded_faces, connection.mirror)
 
 

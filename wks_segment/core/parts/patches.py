@@ -7,6 +7,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from ..mesh.adjacency import FaceAdjacency
+from ..mesh.canonical import STEP, in_steps
 from ..mesh.triangle_mesh import FloatArray, IntArray, connected_groups
 
 N_PATCHES = 300
@@ -15,13 +16,6 @@ SINGLE_FACES = 600
 """Largest number of faces for which each face is a patch of its own."""
 CREASE, STEEPEST = 0.3, 15.0
 """Extra length of a path across a crease, in units of its curvature up to a limit, so that patches end at creases."""
-STEP = 2.0**-30
-"""Lengths are whole multiples of this, whose sums are exact: equal ones stay equal, and rounding does not choose."""
-
-
-def in_steps(lengths: FloatArray) -> FloatArray:
-    """Lengths, for a surface of area 1, as whole multiples of `STEP`."""
-    return np.asarray(np.round(lengths / STEP) * STEP)
 
 
 def patches_of(

@@ -10,7 +10,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..geometry.creases import smooth_normals, vertex_normals
-from ..mesh.canonical import Frame
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ..poses.pose_cache import Workpiece
 from ..progress import Progress
@@ -30,13 +29,11 @@ NEAREST_SLACK = 0.01
 def visible(pose: Workpiece, faces: IntArray, progress: Progress | None = None) -> BoolArray:
     """(r, r) whether the centers of some faces of a pose see each other through the inside; true on the diagonal."""
     surface = pose.surface
-    unit = np.sqrt(surface.original.area)
-    # The search is approximate along the axes; in the frame of the shape it ends alike for a turned mesh.
-    frame = Frame.of(surface.mesh)
-    vertices = frame.places(surface.mesh.vertices) / unit
-    normals = frame.directions(smooth_normals(vertex_normals(surface), pose.flows.short(NORMAL_LENGTH)))
+    unit = np.sqrt(surface.mesh.area)
+    vertices = surface.mesh.vertices / unit
+    normals = smooth_normals(vertex_normals(surface), pose.flows.short(NORMAL_LENGTH))
     tree = cKDTree(vertices)
-    places = frame.places(surface.original.face_centers[faces]) / unit
+    places = surface.to_faces(vertices)[faces]
     directions = surface.to_faces(normals)[faces]
     count = len(faces)
     first, second = np.triu_indices(count, 1)

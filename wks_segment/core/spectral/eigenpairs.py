@@ -19,7 +19,6 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse import csr_matrix, diags
 
-from ..mesh.canonical import Frame
 from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
 from ..message import Message
 from ..progress import Progress
@@ -204,12 +203,10 @@ class _Problem:
     @classmethod
     def of(cls, mesh: TriangleMesh) -> _Problem:
         """Eigenproblem of a mesh of any area."""
-        # In the frame of the shape: cells and cuts of the solver follow the axes, and a turned mesh has the same ones.
-        places = Frame.of(mesh).places(mesh.vertices)
-        order = _along_curve(places)
+        order = _along_curve(mesh.vertices)
         place = np.empty_like(order)
         place[order] = np.arange(len(order))
-        return cls(mesh.at(places).with_unit_area(place), place)
+        return cls(mesh.with_unit_area(place), place)
 
     def operator(self) -> csr_matrix:
         """A = M^-½ S M^-½ of the standard form A ψ = λ ψ, ψ = M^½ φ."""
