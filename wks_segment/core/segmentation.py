@@ -6,7 +6,7 @@ descriptor" (2011).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from copy import copy
 from dataclasses import replace
 from os import PathLike
@@ -26,6 +26,7 @@ from .learning.training_samples import TrainingSamples
 from .mesh.surface import IslandMode
 from .mesh.triangle_mesh import FloatArray, TriangleMesh
 from .message import Message
+from .poses.arguments import as_list
 from .poses.pose_cache import AnyPose, Workpiece
 from .poses.signature_cache import Cache
 from .progress import Progress, ReportFunction
@@ -142,7 +143,7 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
     @one_thread  # k-means included: the same digits with any number of threads
     def fit(
         self,
-        meshes: Sequence[AnyPose],
+        meshes: Iterable[AnyPose],
         progress: ReportFunction | Progress | None = None,
         rest: TriangleMesh | None = None,
         cache: Cache | None = None,
@@ -174,7 +175,8 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
             If the eigenpairs of a pose could not be computed; see `describe`.
         """
         self._check_parameters()
-        if not len(meshes):
+        meshes = as_list(meshes, "meshes")
+        if not meshes:
             raise ValueError("there is no pose to learn from: pass at least one mesh, better three to five")
         overall, parameters = Progress.of(progress), self._parameters()
         poses = self._all_described(meshes, overall.part(0.0, DESCRIBED), cache)
@@ -214,7 +216,7 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
     def with_segments(
         self,
         n_segments: NSegments,
-        poses: Sequence[AnyPose] = (),
+        poses: Iterable[AnyPose] = (),
         rest: TriangleMesh | None = None,
     ) -> PoseSegmentation:
         """A copy of the model with another number of segments, at once: its components merged into as many groups.
@@ -253,7 +255,8 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
         model = copy(self)
         model.n_segments = n_segments
         model._check_parameters()
-        if len(poses):
+        poses = as_list(poses, "poses")
+        if poses:
             known = [atlas for atlas in (self.regions_, self.sides_) if atlas is not None]
             described = [model._described(pose) for pose in poses]
             model.regions_, model.sides_ = model._labeler().atlases(described, rest, Progress(), known)

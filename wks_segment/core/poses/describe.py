@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
 from functools import partial
 from typing import Literal
@@ -19,6 +19,7 @@ from ..spectral.intrinsic_delaunay import Laplacian, better_triangles
 from ..spectral.memory import available_memory
 from ..spectral.signature import wave_kernel_signature_of
 from ..threads import one_blas_thread
+from .arguments import as_list
 from .pose_cache import AnyPose, Workpiece
 from .pose_signature import PoseSignature
 from .signature_cache import SignatureCache, signature_key
@@ -116,7 +117,7 @@ class PoseDescriber:
     @one_blas_thread  # poses run in parallel instead: matrices this narrow gain nothing from more threads
     def describe_all(
         self,
-        meshes: Sequence[TriangleMesh],
+        meshes: Iterable[TriangleMesh],
         connections: Sequence[Connection] | None = None,
         progress: ReportFunction | Progress | None = None,
         names: Sequence[str] | None = None,
@@ -146,7 +147,8 @@ class PoseDescriber:
         ValueError, SpectrumError, MemoryError
             As by `describe`; the message begins with the name of the pose.
         """
-        if not len(meshes):
+        meshes = as_list(meshes, "meshes")
+        if not meshes:
             return []
         called = names or [Message("pose {number}", number=i + 1) for i in range(len(meshes))]
         connected = connect_alike(meshes, called, self.pieces) if connections is None else connections
