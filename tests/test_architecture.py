@@ -29,7 +29,7 @@ LAYERS = {
         {"ranking"},
     ],
     "blender": [
-        {"errors"},
+        {"errors", "streams"},
         {"parts"},
         {"props"},
         {"scene"},

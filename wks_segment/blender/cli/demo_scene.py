@@ -21,8 +21,9 @@ from ..scene.characters import Character
 from ..scene.poses import Pose
 from ..workflow import model_library, pipeline
 from ..workflow.pipeline import LabelRequest, Run
-from ..workflow.report import pose_warnings
+from ..workflow.report import pose_warnings, shape_warnings
 from .creature import FIRST_FRAME, LAST_FRAME, build_creature
+from .reading import warn_at_once
 from .results import rounded_seconds, save_model
 
 DEMO_SUFFIXES = {"scene": ".blend", "picture": ".png", "model": ".json"}
@@ -74,6 +75,7 @@ class Demo:
         with run.report.stage("read"):
             poses = reader.read_frames(context, self.character, frames)
         run.report.poses = poses
+        warn_at_once(run.report, *shape_warnings(poses), *pose_warnings(poses, from_frames=True))
         model = settings.new_model()
         labels = self._labels(model, poses, is_learned, settings, run)
         areas = [polygon_areas(pose, len(labels[0])) for pose in poses]
@@ -99,7 +101,7 @@ class Demo:
             "notes": run.report.notes,
             "seconds": rounded_seconds(run.report),
             "agreement": round(float(np.mean(np.array(agreement)[~np.array(is_learned)])), 4),
-            "warnings": [*run.report.warnings, *pose_warnings(poses, from_frames=True)],
+            "warnings": run.report.warnings,
             "files": {kind: str(path) for kind, path in paths.items()},
         }
 

@@ -3,33 +3,65 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import bpy
 
+from ...core.message import Message, message_of
 from ..errors import UserError
 from ..scene import file_formats
 from ..scene import poses as reader
-from ..scene.characters import Character, armature_of, group, mesh_objects
+from ..scene.characters import Character, armature_of, group, mesh_objects, quoted
+from ..scene.missing_files import missing_files
 from ..scene.pose_library import read_actions
 from ..scene.poses import Pose
 from ..workflow import model_library
 from ..workflow.model_ranking import NamedModel, models_in_files
-from ..workflow.report import Report
+from ..workflow.report import Report, shape_warnings
 
 
 def read_poses(options: argparse.Namespace, report: Report) -> list[Pose]:
-    """Poses of all characters in all files of the options."""
+    """Poses of all characters in all files of the options; warns of what is wrong with them before they are used."""
     poses: list[Pose] = []
     with report.stage("read"):
-        for path, objects in zip(options.files, file_formats.open_files(options.files), strict=True):
-            characters = characters_in(path, objects, options.object)
-            set_action(characters, options.action)
-            for character in characters:
-                poses += _poses_of(character, options)
+        opened = file_formats.open_files(options.files)
+        missing = missing_files()
+        try:
+            for path, objects in zip(options.files, opened, strict=True):
+                poses += _poses_in(path, objects, options, report)
+        except UserError as error:
+            if not missing:
+                raise
+            template = "{reason}; files that it needs are missing: {names}"
+            raise UserError(template, reason=message_of(error), names=", ".join(missing)) from error
     report.poses = poses
+    if missing:
+        template = "Files that this one needs are missing, and what is in them is left out: {names}"
+        warn_at_once(report, Message(template, names=", ".join(missing)))
+    warn_at_once(report, *shape_warnings(poses))
     return poses
+
+
+def warn_at_once(report: Report, *warnings: str) -> None:
+    """Add warnings to a report, and print them on standard error before a long computation."""
+    for warning in warnings:
+        print(f"warning: {warning}", file=sys.stderr, flush=True)
+    report.warn(*warnings)
+
+
+def _poses_in(path: Path, objects: list[bpy.types.Object], options: argparse.Namespace, report: Report) -> list[Pose]:
+    """Poses of the characters in a file."""
+    characters = characters_in(path, objects, options.object)
+    set_action(characters, options.action)
+    if options.shape_keys is not None:
+        without = [character for character in characters if not reader.shape_key_names(character)]
+        if without and len(without) < len(characters):
+            names = quoted(character.name for character in without)
+            warn_at_once(report, Message("{names} has no shape keys and is left out", names=names))
+            characters = [character for character in characters if character not in without]
+    return [pose for character in characters for pose in _poses_of(character, options)]
 
 
 def _poses_of(character: Character, options: argparse.Namespace) -> list[Pose]:

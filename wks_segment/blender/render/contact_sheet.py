@@ -19,6 +19,7 @@ from ..errors import UserError
 from ..parts.part_style import PLAIN, Style
 from ..scene.attributes import write_attribute
 from ..scene.poses import Pose
+from ..streams import silent
 
 TILE_PIXELS = 480
 """Width and height of the tile of a pose, in pixels."""
@@ -164,7 +165,8 @@ def render(scene: bpy.types.Scene, path: Path, width: int, height: int, light: s
     shading.light, shading.color_type = light, "VERTEX"
     shading.show_cavity = light == "STUDIO"
     try:
-        bpy.ops.render.render(write_still=True, scene=scene.name)
+        with silent(unless_it_fails=True):
+            bpy.ops.render.render(write_still=True, scene=scene.name)
     except RuntimeError as error:
         raise UserError("{path}: the picture could not be rendered: {reason}", path=path, reason=error) from error
     try:

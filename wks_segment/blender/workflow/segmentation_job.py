@@ -22,7 +22,7 @@ from ..scene.pose_sources import read_training_poses
 from ..scene.poses import Pose
 from . import model_library, pipeline
 from .pipeline import LabelRequest, Run
-from .report import Report, pose_warnings, segment_warnings
+from .report import Report, pose_warnings, segment_warnings, shape_warnings
 
 LEARN_SHARE, DESCRIBE_SHARE = 0.9, 0.6
 """Share of the progress bar before labeling, when a model is learned and when one is applied: learning takes longer.
@@ -110,6 +110,7 @@ class SegmentationJob:
         cls, context: bpy.types.Context, model: PoseSegmentation, report: Report, cache: Cache, learns: bool
     ) -> SegmentationJob:
         settings, poses = context.scene.wks_segment, report.poses
+        report.warn(*shape_warnings(poses))
         with report.stage("read"):
             characters = [pose.character for pose in poses]
             request, guard = LabelRequest.of(settings, characters), ChangeGuard(context.scene, characters)

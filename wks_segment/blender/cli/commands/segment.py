@@ -12,7 +12,7 @@ from ...workflow import model_library, pipeline
 from ...workflow.pipeline import Run
 from ...workflow.report import Report, pose_warnings, segment_warnings
 from ..command_options import add_outputs, add_poses, add_resources, add_settings, cache_from, settings_from
-from ..reading import read_poses
+from ..reading import read_poses, warn_at_once
 from ..results import check_outputs, label_and_write, result_of, save_model
 
 
@@ -40,6 +40,7 @@ def _segment(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     if options.model:
         file_formats.check_folder(options.model)
     poses = read_poses(options, run.report)
+    warn_at_once(run.report, *pose_warnings(poses, from_frames=options.frames is not None))
     settings = settings_from(options)
     model = settings.new_model()
     pipeline.check_limits(model, poses, settings)
@@ -53,5 +54,4 @@ def _segment(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     model_library.keep(settings, model, run.report.facts, poses[0].character.name, add=True)
     if options.output:
         file_formats.save_scene(options.output)
-    run.report.warnings += pose_warnings(poses, from_frames=options.frames is not None)
     return result_of(options, run.report)

@@ -1,0 +1,77 @@
+"""What a file is by its content, whatever its name says: Blender's importers say little about other files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from urllib.parse import unquote
+
+from ..errors import UserError
+
+HEAD = 512
+"""Bytes at the beginning of a file that are looked at: more than all signatures, and than a pointer to another file."""
+SIGNATURES = {
+    ".blend": (b"BLENDER", b"\x1f\x8b", b"\x28\xb5\x2f\xfd"),  # as it is, or compressed by gzip or Zstandard
+    ".glb": (b"glTF", b"{"),
+    ".gltf": (b"glTF", b"{"),
+    ".ply": (b"ply",),
+    ".abc": (b"Ogawa", b"\x89HDF"),
+    ".usdc": (b"PXR-USDC",),
+    ".usda": (b"#usda",),
+    ".usdz": (b"PK\x03\x04",),
+}
+"""How files of a format begin. A suffix that is not here has no signature, or several that importers read."""
+ARCHIVES = (b"PK\x03\x04", b"\x1f\x8b", b"7z\xbc\xaf\x27\x1c", b"Rar!", b"BZh", b"\xfd7zXZ")
+"""How archives begin."""
+POINTERS = {b"version https://git-lfs": ("Git LFS", "git lfs pull"), b"/annex/objects/": ("git-annex", "git annex get")}
+"""How files begin that stand for a large file of a repository; what made them, and the command that gets the file."""
+
+
+def check_content(path: Path) -> None:
+    """UserError if a file cannot be what its suffix says, or a part of it is missing; says what it is instead."""
+    head = _check_whole(path)
+    suffix = path.suffix.lower()
+    signatures = SIGNATURES.get(suffix, ())
+    if head.startswith(b"<"):
+        raise UserError(
+            "{path}: it is a web page or another text in tags, not a 3D file: download the file itself", path=path
+        )
+    if head.startswith(ARCHIVES) and not head.startswith(signatures or b"\0"):
+        raise UserError("{path}: it is an archive: unpack it first", path=path)
+    if signatures and not head.startswith(signatures):
+        raise UserError(
+            "{path}: it is no {suffix} file, whatever its name says: export or download it again",
+            path=path, suffix=suffix,
+        )  # fmt: skip
+    if head.startswith(b"{"):
+        _check_buffers(path)
+
+
+def _check_whole(path: Path) -> bytes:
+    """The beginning of a file, without a byte order mark and white space; UserError if there is no content in it."""
+    with path.open("rb") as file:
+        head = file.read(HEAD).removeprefix(b"\xef\xbb\xbf").lstrip()
+    if not head:
+        raise UserError("{path}: the file is empty: export or download it again", path=path)
+    for beginning, (maker, command) in POINTERS.items():
+        if head.startswith(beginning):
+            raise UserError(
+                '{path}: it is only a pointer of {maker} to the file: get the file itself with "{command}"',
+                path=path, maker=maker, command=command,
+            )  # fmt: skip
+    return head
+
+
+def _check_buffers(path: Path) -> None:
+    """UserError if a file that a glTF file keeps its numbers in is not there."""
+    try:
+        buffers = [str(buffer["uri"]) for buffer in json.loads(path.read_bytes())["buffers"] if "uri" in buffer]
+    except (ValueError, LookupError, TypeError):
+        return  # the importer says what is wrong with it
+    for uri in buffers:
+        if uri.startswith("data:"):
+            continue
+        part = path.parent / unquote(uri)
+        if not part.is_file():
+            raise UserError("{path}: a file that it needs is missing: {part}", path=path, part=part)
+        _check_whole(part)
