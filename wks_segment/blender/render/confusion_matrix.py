@@ -30,8 +30,8 @@ def render_matrix(retrieval: Retrieval, path: Path) -> None:
     with picture_scene() as scene:
         widths = [0.0]
         for i, name in enumerate(names):
-            row = _text(scene, name, -0.2, -i - 0.5 - TEXT_HEIGHT / 3, "RIGHT", NAME_WIDTH)
-            _text(scene, name, i + 0.5 + TEXT_HEIGHT / 3, 0.2, "LEFT", NAME_WIDTH, vertical=True)
+            row = _text(scene, name, (-0.2, -i - 0.5 - TEXT_HEIGHT / 3), "RIGHT", NAME_WIDTH)
+            _text(scene, name, (i + 0.5 + TEXT_HEIGHT / 3, 0.2), "LEFT", NAME_WIDTH, vertical=True)
             widths.append(width_of(row.data))
             for j, count in enumerate(counts[i]):
                 share = count / max(counts[i].sum(), 1)
@@ -40,10 +40,10 @@ def render_matrix(retrieval: Retrieval, path: Path) -> None:
                 _cell(scene, j, -i, color)
                 if count:
                     place = j + 0.5, -i - 0.5 - TEXT_HEIGHT / 3
-                    _text(scene, str(count), *place, "CENTER", CELL_TEXT_WIDTH, light=share > 0.4)
+                    _text(scene, str(count), place, "CENTER", CELL_TEXT_WIDTH, light=share > 0.4)
         label = max(widths) + 0.4
         lines = [
-            _text(scene, line, -label, -len(names) - (1.6 + 1.5 * i) * TEXT_HEIGHT, "LEFT", LINE_WIDTH)
+            _text(scene, line, (-label, -len(names) - (1.6 + 1.5 * i) * TEXT_HEIGHT), "LEFT", LINE_WIDTH)
             for i, line in enumerate((summary, legend))
         ]
         width = max(label + len(names), *(width_of(line.data) for line in lines)) + 2 * MATRIX_MARGIN
@@ -61,12 +61,12 @@ def render_matrix(retrieval: Retrieval, path: Path) -> None:
 
 
 def _text(
-    scene: bpy.types.Scene, text: str, x: float, y: float, align: str, width: float,
+    scene: bpy.types.Scene, text: str, place: tuple[float, float], align: str, width: float,
     vertical: bool = False, light: bool = False,
 ) -> bpy.types.Object:  # fmt: skip
-    """Add text at (x, y), from left to right or, if vertical, upwards."""
+    """Add text at a place, from left to right or, if vertical, upwards."""
     letters = add_text(scene, text, TEXT_HEIGHT, width, align, (1.0, 1.0, 1.0) if light else (0.05, 0.05, 0.05))
-    letters.location = (x, y, 1.0)
+    letters.location = (*place, 1.0)
     letters.rotation_euler.z = pi / 2 if vertical else 0.0
     return letters
 
