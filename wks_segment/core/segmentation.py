@@ -36,9 +36,11 @@ from .spectral.laplacian import unit_area_masses
 from .threads import one_blas_thread, one_thread
 from .user_labels import PartNotes
 
-DESCRIBED, GROUPED = 0.2, 0.8
-"""Shares of the time of a fit after which the poses are described, and the parts are found and merged."""
-
+GROUPED, RECOGNIZED = 0.63, 0.9
+"""Shares of the time of learning from described poses after which the parts are found and merged, and their regions
+are known: means of ten characters."""
+FIRST_ROUND = 0.7
+"""Share of the time that is left for regions after which a round of finding them ends; mostly there is one."""
 
 MERGING_ROUNDS = 6
 """Most times that regions are found, each time without a segment that was found nowhere."""
@@ -179,13 +181,16 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
         if not meshes:
             raise ValueError("there is no pose to learn from: pass at least one mesh, better three to five")
         overall, parameters = Progress.of(progress), self._parameters()
-        poses = self._all_described(meshes, overall.part(0.0, DESCRIBED), cache)
-        overall(DESCRIBED, "parts")
+        poses, described = self._all_described(meshes, overall, cache)
+        overall = overall.part(described, 1.0)
+        overall(0.0, "parts")
         training = TrainingSamples.of(poses, parameters)
-        learned = learn_parts(parameters, poses, training, rest, cache, overall.part(DESCRIBED, GROUPED))
+        learned = learn_parts(parameters, poses, training, rest, cache, overall.part(0.0, GROUPED))
         atlases = None
         if learned.grouping is not None:
-            learned, atlases = self._recognized(learned, training.standardizer, poses, rest, overall.part(GROUPED, 1.0))
+            learned, atlases = self._recognized(
+                learned, training.standardizer, poses, rest, overall.part(GROUPED, RECOGNIZED)
+            )
         self._set_learned(learned, training.standardizer, atlases, usual_scores(learned.mixture, training))
         self.part_notes_ = PartNotes()
         overall(1.0, "done")
@@ -345,8 +350,8 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
         assert learned.grouping is not None
         for round_ in range(MERGING_ROUNDS):
             labeler = self._labeler_of(learned.mixture, standardizer, learned.grouping, learned.traits)
-            step = progress.part(round_ / MERGING_ROUNDS, (round_ + 1) / MERGING_ROUNDS, "regions")
-            atlases = labeler.atlases(poses, rest, step)
+            atlases = labeler.atlases(poses, rest, progress.part(0.0, FIRST_ROUND, "regions"))
+            progress = progress.part(FIRST_ROUND, 1.0)
             lost = sorted(set(range(labeler.n_segments)) - set(atlases[1].traits.segment.tolist()))
             if not lost or learned.traits is not None or round_ == MERGING_ROUNDS - 1:
                 break  # the tree that is returned is the one that the atlases are of

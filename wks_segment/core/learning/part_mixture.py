@@ -55,8 +55,8 @@ SMOOTHING_LENGTH = 0.03
 """Width of the smoothing along borders at smoothness 1, in units of the square root of the area."""
 VANISHED = 0.5
 """A kind that keeps less than this share of its area when borders move is merged before all others."""
-FOUND = 0.7
-"""Share of the time of learning after which the kinds are found."""
+FOUND = 0.63
+"""Share of the time of finding parts and fitting the mixture after which the kinds are found."""
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,9 @@ from ..command_options import (
 from ..reading import read_models, read_poses
 from ..results import check_outputs, label_and_write, result_of
 
+RANKED = 0.9
+"""Share of the time after which the best model is known: its signatures serve to label as well."""
+
 
 def add(commands: Any) -> None:
     """Add the command to the subparsers of the command line."""
@@ -54,7 +57,8 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
         poses = read_poses(options, run.report)
         # Signatures that are computed for the ranking serve to label as well.
         run = replace(run, cache=run.cache or MemoryCache())
-        ranking = _rank(models, poses, options, run)
+        ranking = _rank(models, poses, options, run.with_progress(run.progress.part(0.0, RANKED)))
+        run = run.with_progress(run.progress.part(RANKED, 1.0))
         chosen = models[ranking.best.index]
         verdict = {"best": chosen.name, "verdict": ranking.verdict}
     model = chosen.model
@@ -64,8 +68,8 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     if options.smoothness is not None:
         model.smoothness = settings.smoothness
     pipeline.check_limits(model, poses, settings)
-    described = pipeline.describe(model, poses, run)
-    label_and_write(model, poses, described, settings, options, run)
+    described, rest = pipeline.describe_to_label(model, poses, run)
+    label_and_write(model, poses, described, settings, options, run.with_progress(rest))
     if options.output:
         file_formats.save_scene(options.output)
     return result_of(options, run.report) | verdict
