@@ -46,10 +46,13 @@ MAX_CORRECTIONS = 4
 LEAST_VALUE = 1e-6
 """Fraction of the last eigenvalue below which the first one is rounding, or needs more digits than there are."""
 
-PREPARED, COARSE_SOLVED, CORRECTED, EACH_ROUND, CERTAIN = 0.08, 0.30, 0.34, 0.22, 0.9
-"""Shares of the time of a solve after which the coarse space is made and solved, and its functions are corrected. One
-or two rounds follow, which enlarge the space and correct again, seldom more: each leaves this share of what is left
-until the pairs are certain. On characters of 8,000 to 19,000 vertices the shares are off by at most 0.17."""
+PREPARED, COARSE_SOLVED, CORRECTED, CERTAIN = 0.15, 0.3, 0.34, 0.9
+"""Shares of the time of a solve after which the coarse space is made and solved, its functions are corrected, and the
+pairs are certain. In between, rounds enlarge the space and correct again. The dense coarse problem cannot report, so
+that the first share is ahead of the time and the second one behind."""
+LEFT_BY_ROUND, LEFT_BY_SLOW_ROUND, SLOW_CHANGE = 0.15, 0.45, 0.4
+"""Share of the time until the pairs are certain that a round leaves. Mostly one round suffices, and two to three if the
+first correction changes a hundredth of the functions by more than the last number: so on 10 of 11 characters."""
 ENLARGED = 0.95
 """Share of the time of a round after which the space is enlarged; the correction is quick."""
 CELL_LEVEL_ABOVE = 180_000
@@ -141,18 +144,20 @@ def _solve(
             continue
         vectors = block_product(prolongation, weights, FAST_COLUMNS)
         progress(COARSE_SOLVED)
-        done = COARSE_SOLVED
-        ends = [CERTAIN - (CERTAIN - CORRECTED) * EACH_ROUND**step for step in range(MAX_CORRECTIONS + 1)]
+        done, end = COARSE_SOLVED, CORRECTED
         for step in range(MAX_CORRECTIONS):
             changes = np.empty(len(values))
             for columns in panels(len(vectors), len(values)):
                 panel = np.ascontiguousarray(vectors[:, columns])
                 values[columns], changes[columns] = correction(values[columns], panel)
                 vectors[:, columns] = panel
-                progress(done + (ends[step] - done) * columns.stop / len(values))
+                progress(done + (end - done) * columns.stop / len(values))
             if not changes[:count].max() <= (LARGEST_LATER_CHANGE if step else LARGEST_CHANGE):
-                done = ends[step] + ENLARGED * (ends[step + 1] - ends[step])
-                values, vectors = _enlarged(correction, vectors, progress.part(ends[step], done))
+                if step == 0:
+                    left = LEFT_BY_SLOW_ROUND if np.quantile(changes, 0.99) > SLOW_CHANGE else LEFT_BY_ROUND
+                begun, end = end, CERTAIN - left * (CERTAIN - end)
+                done = begun + ENLARGED * (end - begun)
+                values, vectors = _enlarged(correction, vectors, progress.part(begun, done))
                 continue
             # The residual of a Ritz vector is orthogonal to all others, and so nearly is its correction.
             order = np.argsort(values, kind="stable")[:count]
