@@ -64,6 +64,10 @@ def gltf(path, nodes, buffer=None):
 def test_nodes_that_contain_each_other(command, tmp_path):
     path = gltf(tmp_path / "round.gltf", [{"children": [1]}, {"children": [0]}])
     refused(command, path, "contain each other in a circle")
+    content = path.read_bytes() + b" " * (-len(path.read_bytes()) % 4)
+    binary = tmp_path / "round.glb"
+    binary.write_bytes(struct.pack("<4s4I", b"glTF", 2, 20 + len(content), len(content), 0x4E4F534A) + content)
+    refused(command, binary, "contain each other in a circle")
 
 
 def test_importer_that_fails_in_python(command, tmp_path):

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import json
+import struct
+from contextlib import suppress
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote
 
 from ..errors import UserError
@@ -23,6 +27,8 @@ SIGNATURES = {
 """How files of a format begin. A suffix that is not here has no signature, or several that importers read."""
 ARCHIVES = (b"PK\x03\x04", b"\x1f\x8b", b"7z\xbc\xaf\x27\x1c", b"Rar!", b"BZh", b"\xfd7zXZ")
 """How archives begin."""
+CHUNK_HEADER = struct.Struct("<4s4I")
+"""Beginning of a binary glTF file: its name, version and size, and the size and kind of the first chunk."""
 POINTERS = {b"version https://git-lfs": ("Git LFS", "git lfs pull"), b"/annex/objects/": ("git-annex", "git annex get")}
 """How files begin that stand for a large file of a repository; what made them, and the command that gets the file."""
 
@@ -43,8 +49,8 @@ def check_content(path: Path) -> None:
             "{path}: it is no {suffix} file, whatever its name says: export or download it again",
             path=path, suffix=suffix,
         )  # fmt: skip
-    if head.startswith(b"{"):
-        _check_buffers(path)
+    if suffix in (".glb", ".gltf"):
+        _check_gltf(path, _gltf_content(path))
 
 
 def _check_whole(path: Path) -> bytes:
@@ -62,11 +68,16 @@ def _check_whole(path: Path) -> bytes:
     return head
 
 
-def _check_buffers(path: Path) -> None:
-    """UserError if a file that a glTF file keeps its numbers in is not there."""
+def _check_gltf(path: Path, content: Any) -> None:
+    """UserError if a file that a glTF file keeps its numbers in is not there, or if its nodes contain each other."""
     try:
-        buffers = [str(buffer["uri"]) for buffer in json.loads(path.read_bytes())["buffers"] if "uri" in buffer]
-    except (ValueError, LookupError, TypeError):
+        buffers = [str(buffer["uri"]) for buffer in content.get("buffers", ()) if "uri" in buffer]
+        children = {i: node.get("children", ()) for i, node in enumerate(content.get("nodes", ()))}
+        TopologicalSorter(children).prepare()
+    except CycleError as error:
+        circle = ", ".join(map(str, error.args[1]))
+        raise UserError("{path}: its nodes contain each other in a circle: {nodes}", path=path, nodes=circle) from error
+    except (AttributeError, TypeError):
         return  # the importer says what is wrong with it
     for uri in buffers:
         if uri.startswith("data:"):
@@ -75,3 +86,13 @@ def _check_buffers(path: Path) -> None:
         if not part.is_file():
             raise UserError("{path}: a file that it needs is missing: {part}", path=path, part=part)
         _check_whole(part)
+
+
+def _gltf_content(path: Path) -> Any:
+    """The description in a glTF file, which is the whole file or its first chunk; None if it cannot be read."""
+    with path.open("rb") as file, suppress(ValueError, struct.error, RecursionError):
+        header = file.read(CHUNK_HEADER.size)
+        if header.startswith(b"glTF"):
+            return json.loads(file.read(CHUNK_HEADER.unpack(header)[3]))
+        return json.loads(header + file.read())
+    return None

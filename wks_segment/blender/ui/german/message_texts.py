@@ -303,6 +303,7 @@ GERMAN_MESSAGES = {
     "{path}: a file that it needs is missing: {part}": "{path}: eine Datei fehlt, die sie braucht: {part}",
     "{path}: there is no mesh in this file: Blender's importer found nothing in it, so it is empty or damaged": "{path}: in dieser Datei ist kein Mesh: Blenders Importer hat nichts darin gefunden, sie ist also leer oder beschädigt",
     "{path}: Blender's importer of {suffix} files is turned off or missing in this Blender: enable its add-on": "{path}: Blenders Importer für {suffix}-Dateien ist abgeschaltet oder fehlt in diesem Blender: sein Add-on einschalten",
+    "{path}: its nodes contain each other in a circle: {nodes}": "{path}: ihre Knoten enthalten einander im Kreis: {nodes}",
     "its parts contain each other in a circle, or are nested too deeply": "ihre Teile enthalten einander im Kreis oder sind zu tief verschachtelt",
     "its importer failed ({error}), so it is damaged or of a kind that the importer does not know": "der Importer ist gescheitert ({error}), sie ist also beschädigt oder von einer Art, die er nicht kennt",
     "{path} …: the name is too long: take at most {name} bytes, and {whole} with all folders": "{path} …: der Name ist zu lang: höchstens {name} Bytes nehmen, und {whole} mit allen Ordnern",
