@@ -46,9 +46,9 @@ IMPORTERS: dict[str, Callable[[str], object]] = {
     ".usdz": lambda path: bpy.ops.wm.usd_import(filepath=path),
 }
 TRACEBACK = "Traceback (most recent call last):"
-FILE_NAME_BYTES, PATH_BYTES = 230, 1000
-"""Most bytes of the name of a file, and of its whole path. File systems take 255 bytes and Blender 1023, and the name
-gets a suffix while the file is written."""
+READ_NAME, WRITTEN_NAME, PATH_BYTES = 255, 230, 1000
+"""Most bytes of the name of a file that is read, of one that is written, and of a whole path. File systems take 255
+bytes and Blender 1023, and a name gets a suffix while its file is written."""
 EXPORTERS: dict[str, Callable[[str], object]] = {
     ".blend": lambda path: bpy.ops.wm.save_as_mainfile(filepath=path, copy=True),
     ".glb": lambda path: bpy.ops.export_scene.gltf(filepath=path, export_vertex_color="ACTIVE"),
@@ -67,7 +67,7 @@ def open_files(paths: list[Path]) -> list[list[bpy.types.Object]]:
         If a file does not exist, is of no known format, or cannot be read.
     """
     for path in paths:
-        check_length(path)
+        check_length(path, READ_NAME)
         if not path.is_file():
             raise UserError("{path}: there is no such file", path=path)
         if path.suffix.lower() not in IMPORTERS:
@@ -136,18 +136,18 @@ def check_output(path: Path) -> None:
     check_folder(path)
 
 
-def check_length(path: Path) -> None:
-    """UserError if the file system or Blender cannot take a path, because it is too long."""
-    if len(os.fsencode(path.name)) > FILE_NAME_BYTES or len(os.fsencode(path.resolve())) > PATH_BYTES:
+def check_length(path: Path, most: int) -> None:
+    """UserError if the file system or Blender cannot take a path, because it or the name of its file is too long."""
+    if len(os.fsencode(path.name)) > most or len(os.fsencode(path.resolve())) > PATH_BYTES:
         raise UserError(
             "{path} …: the name is too long: take at most {name} bytes, and {whole} with all folders",
-            path=str(path)[:80], name=FILE_NAME_BYTES, whole=PATH_BYTES,
+            path=str(path)[:80], name=most, whole=PATH_BYTES,
         )  # fmt: skip
 
 
 def check_folder(path: Path) -> None:
     """UserError unless a file can be written to a path: its folder exists, and its name is not too long."""
-    check_length(path)
+    check_length(path, WRITTEN_NAME)
     if not path.resolve().parent.is_dir():
         raise UserError("{path}: the folder {folder} does not exist", path=path, folder=path.resolve().parent)
     if path.is_dir():
