@@ -317,15 +317,13 @@ class _SharedProgress:
 
     def report(self) -> None:
         """Report the mean over the poses, under the name of the first pose that is not done."""
-        if not self._done:
-            return
-        current = next((i for i, share in self._done.items() if share < 1), max(self._done))
+        current = next((i for i, share in self._done.items() if share < 1), self._n_poses - 1)
         if self._names is None:
             stage = Message("pose {number} of {count}", number=current + 1, count=self._n_poses)
         else:
             name = self._names[current]
             stage = Message("{name} ({number} of {count})", name=name, number=current + 1, count=self._n_poses)
-        self._progress(sum(self._done.values()) / len(self._done), stage)
+        self._progress(sum(self._done.values()) / len(self._done) if self._done else 1.0, stage)
 
     def _note(self, i: int, share: float) -> None:
         self._done[i] = share
