@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from shapes import creature, icosphere, split_at_every_corner, together
 
-from wks_segment.core import PoseSegmentation, TriangleMesh, prepare_surface
+from wks_segment.core import MemoryCache, PoseSegmentation, TriangleMesh, prepare_surface
 from wks_segment.core.mesh.adjacency import FaceAdjacency, connected_regions
 
 SMALL = {"n_segments": 4, "n_eigenpairs": 60}
@@ -170,6 +170,22 @@ def test_progress_rises_to_one():
     assert seen[0][0] == "pose 1 of 2"
     assert sum(stage == "parts" for stage, _ in seen) > 10
     assert {"mixture", "regions"} <= {stage for stage, _ in seen}
+
+
+def test_progress_has_a_share_for_what_is_computed_only():
+    """Signatures that are known take no time, and none of the bar."""
+
+    def first_of(stage, poses, cache=None):
+        seen = []
+        PoseSegmentation(**SMALL).fit(poses, lambda *report: seen.append(report), cache=cache)
+        return next(share for name, share in seen if name == stage)
+
+    cache, model = MemoryCache(), PoseSegmentation(**SMALL)
+    all_new = first_of("parts", COARSE[:2], cache)
+    assert 0.5 < all_new < 0.9
+    assert first_of("parts", COARSE[:2], cache) == 0
+    assert 0.2 < first_of("parts", COARSE[:3], cache) < all_new - 0.1
+    assert first_of("parts", [model.describe(pose) for pose in COARSE[:2]]) == 0
 
 
 class StopError(Exception):

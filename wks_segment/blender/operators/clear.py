@@ -5,10 +5,11 @@ from __future__ import annotations
 import bpy
 
 from ...core.message import Message
+from ..errors import UserError
 from ..outputs.labels import clear_labels
 from ..outputs.part_attributes import has_labels
 from ..outputs.separate import original_of, unite
-from ..scene.characters import selected_meshes
+from ..scene.characters import quoted, selected_meshes
 from ..workflow import segment_list
 from . import _needs, _report
 from ._base import BaseOperator
@@ -25,6 +26,13 @@ class WKS_SEGMENT_OT_clear(BaseOperator, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         selected = selected_meshes(context)
+        linked = [obj.name for obj in selected if has_labels(obj.data) and obj.data.library is not None]
+        if len(linked) == sum(has_labels(obj.data) for obj in selected):
+            raise UserError(
+                "There is nothing to clear: the segments of {names} are in another file: clear them there, or make it "
+                "local first (Object > Relations)",
+                names=quoted(linked),
+            )
         names = {obj.name for obj in selected}
         originals = {original for obj in selected if (original := original_of(obj)) is not None}
         n_kept = sum(unite(context, original) for original in originals)

@@ -107,6 +107,10 @@ def _points_on(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
 
 
 def _principal_axes(points: FloatArray, weights: FloatArray) -> FloatArray:
-    """(3, 3) principal axes of weighted points, as rows."""
+    """(3, 3) principal axes of weighted points, as rows.
+
+    Those of `canonical.Frame` are of vertices, so that they depend on how squares are cut: up to 1° on a figure of
+    boxes, whose images are then too far to find its plane.
+    """
     offsets = points - np.average(points, axis=0, weights=weights)
     return np.asarray(np.linalg.eigh((offsets * weights[:, None]).T @ offsets)[1].T)
