@@ -17,6 +17,9 @@ OWN_FACE_SETS = "wks_segment_own_face_set"
 FIRST_FACE_SET = 1
 """Face set of part 0; Blender counts face sets from 1."""
 
+NO_FACE_SET = 0
+"""Number on faces that were joined or drawn where Blender had no face sets."""
+
 
 class FaceSets:
     """A face set for each part, in place of the artist's own face sets."""
@@ -44,9 +47,12 @@ def _restore(mesh: bpy.types.Mesh, ledger: Ledger) -> None:
     if "face_sets" not in ledger or now is None:
         return
     is_ours = np.isin(now, list(ledger["face_sets"]))
+    written = read_attribute(mesh, ledger.get("written", ""))
+    if written is not None:  # faces of an object that was joined can be in sets with the same numbers
+        is_ours &= written != 0
     own = read_attribute(mesh, ledger.get("own_face_sets", ""))
-    if own is None and is_ours.all():
+    if own is None and (is_ours | (now == NO_FACE_SET)).all():
         mesh.attributes.remove(mesh.attributes[FACE_SET_ATTRIBUTE])
         return
-    now[is_ours] = FIRST_FACE_SET if own is None else own[is_ours]
+    now[is_ours] = FIRST_FACE_SET if own is None else np.where(own == NO_FACE_SET, FIRST_FACE_SET, own)[is_ours]
     write_attribute(mesh.attributes[FACE_SET_ATTRIBUTE], now)

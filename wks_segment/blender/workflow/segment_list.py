@@ -14,9 +14,9 @@ from ...core.mesh.triangle_mesh import IntArray
 from ...core.user_labels import LONGEST_NAME
 from ..outputs.color_attribute import recolor_faces
 from ..outputs.labels import rewrite_labels
-from ..outputs.materials import PART_PROPERTY, recolor_material
 from ..outputs.overrides import by_hand, keep_by_hand, model_labels
 from ..outputs.part_attributes import has_labels, labels_on
+from ..outputs.part_materials import part_of, restyle_material
 from ..outputs.vertex_groups import rename_group
 from ..parts import part_ids
 from ..parts.palette import most_different
@@ -139,11 +139,8 @@ def restyle(settings: WKSSegmentSettings, part: int, name: bool = True, color: b
         for mesh in meshes if color else ():
             recolor_faces(mesh, part, style)
     for material in bpy.data.materials:
-        if material.get(PART_PROPERTY) == part and material.library is None:
-            if name:
-                material.name = style.name_of(part)
-            if color:
-                recolor_material(material, part, style)
+        if part_of(material) == part:
+            restyle_material(material, style, name, color)
 
 
 def make_part(settings: WKSSegmentSettings, name: str, side: int = 0) -> int:

@@ -1,0 +1,161 @@
+"""The materials of parts. One that the artist has changed, renamed or uses elsewhere is the artist's from then on."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+import bpy
+import numpy as np
+
+from ..parts.palette import linear
+from ..parts.part_ids import default_name
+from ..parts.part_style import Style
+from ..scene.fingerprint import fingerprint, users_of
+from .ledger import has_ledger
+from .own_property import OwnProperty
+from .restore_point import is_removed, on_failure
+
+PART_PROPERTY = "wks_segment_component"
+"""Custom property of our materials: the part that they show."""
+TEMPLATE_PROPERTY = "wks_segment_template"
+"""Custom property of our materials that are copies: the name of the material that they were copied from."""
+OTHER_DEFAULTS = ("location", "location_absolute", "use_backface_culling_lightprobe_volume")
+"""Properties of new materials that are not the same in Blender 4.2 and 5.2; they do not change a look."""
+_MADE = OwnProperty("wks_segment_made", "as")
+"""Custom property of our materials: name ("name") and fingerprint ("as") as made, in this version of Blender ("by")."""
+
+
+def part_of(material: bpy.types.Material | None) -> int | None:
+    """The part that a material of ours shows; None for a material of the artist."""
+    part = None if material is None else material.get(PART_PROPERTY)
+    return part if isinstance(part, int) else None
+
+
+def material_of_part(part: int, style: Style, template: bpy.types.Material | None) -> bpy.types.Material:
+    """The material of a part, the same one on all meshes. One that the artist has changed is taken as it is."""
+    source = "" if template is None else template.name
+    for material in bpy.data.materials:
+        is_ours = part_of(material) == part and material.library is None and not is_removed(material)
+        if is_ours and material.get(TEMPLATE_PROPERTY, "") == source:
+            return material
+    return _new_material(part, style, template)
+
+
+def restyle_material(material: bpy.types.Material, style: Style, name: bool, color: bool) -> None:
+    """Give a material of ours the name and the color of its part in a style, unless it is the artist's by now."""
+    part = part_of(material)
+    if part is None or material.library is not None or not is_as_made(material):
+        return
+    old_name, old_color = material.name, tuple(material.diffuse_color)
+
+    def bring_back() -> None:
+        material.name = old_name
+        _paint(material, old_color)
+        _enter(material)
+
+    on_failure(bring_back)
+    if name and without_number(material.name) != style.name_of(part):
+        material.name = style.name_of(part)
+    if color:
+        _paint(material, _color_of(part, style))
+    _enter(material)
+
+
+def is_as_made(material: bpy.types.Material) -> bool:
+    """Whether a material of ours is as it was made: content, name, and users, which are meshes with labels."""
+    if any(not (isinstance(user, bpy.types.Mesh) and has_ledger(user)) for user in users_of(material)[material]):
+        return False
+    made = _MADE.of(material)
+    if made is not None and made.get("by") == bpy.app.version_string:
+        return without_number(material.name) == without_number(made["name"]) and fingerprint(material) == made["as"]
+    return _is_like_new(material, None if made is None else made["name"])
+
+
+def keep_unused() -> list[str]:
+    """Let files keep those of our materials that nothing uses any more; give their names.
+
+    They are the artist's by now: all others are removed.
+    """
+    kept = unused(material for material in bpy.data.materials if part_of(material) is not None)
+    for material in kept:
+        on_failure(lambda material=material: setattr(material, "use_fake_user", False))
+        material.use_fake_user = True
+    return [material.name for material in kept]
+
+
+def unused(materials: Iterable[bpy.types.Material]) -> list[bpy.types.Material]:
+    """Those of some materials that nothing uses, and that will not be removed, ordered by name."""
+    candidates = sorted({m for m in materials if not (m.use_fake_user or is_removed(m))}, key=lambda m: m.name)
+    users = users_of(*candidates) if candidates else {}
+    return [material for material in candidates if all(is_removed(user) for user in users[material])]
+
+
+def without_number(name: str) -> str:
+    """A name without the number that Blender adds to a name that is taken, as when something is appended."""
+    return re.sub(r"\.\d{3,}$", "", name)
+
+
+def _new_material(part: int, style: Style, template: bpy.types.Material | None) -> bpy.types.Material:
+    name = style.name_of(part)
+    if template is None:
+        material = bpy.data.materials.new(name)
+        if bpy.app.version < (5, 0, 0):  # always true since then, and setting it warns
+            material.use_nodes = True
+    else:
+        material = template.copy()
+        material.use_fake_user = False
+        material.name = name
+        material[TEMPLATE_PROPERTY] = template.name
+        if material.asset_data is not None:
+            material.asset_clear()
+    material[PART_PROPERTY] = part
+    _paint(material, _color_of(part, style))
+    _enter(material)
+    return material
+
+
+def _color_of(part: int, style: Style) -> tuple[float, ...]:
+    return (*linear(style.colors_of(np.array([part]))[0]).tolist(), 1.0)
+
+
+def _paint(material: bpy.types.Material, color: tuple[float, ...]) -> None:
+    """Set the color in Solid view, and where the shader has a color of its own."""
+    material.diffuse_color = color
+    for socket in _color_sockets(material):
+        socket.default_value = color
+
+
+def _enter(material: bpy.types.Material) -> None:
+    """Keep how the material is made."""
+    _MADE.put(material, {"name": material.name, "as": fingerprint(material), "by": bpy.app.version_string})
+
+
+def _is_like_new(material: bpy.types.Material, name: str | None) -> bool:
+    """Whether a material that another version has made is like one that is made now."""
+    part = part_of(material)
+    assert part is not None
+    names = {default_name(part)} | {scene.wks_segment.style().name_of(part) for scene in bpy.data.scenes}
+    if without_number(material.name) not in (names if name is None else {without_number(name)}):
+        return False
+    template = bpy.data.materials.get(material.get(TEMPLATE_PROPERTY, ""))
+    new = _new_material(part, Style(), template)
+    _paint(new, tuple(material.diffuse_color))
+    try:
+        return fingerprint(new, ignored=OTHER_DEFAULTS) == fingerprint(material, ignored=OTHER_DEFAULTS)
+    finally:
+        bpy.data.materials.remove(new)
+
+
+def _color_sockets(material: bpy.types.Material) -> list[bpy.types.NodeSocket]:
+    """Sockets where the color of a material is chosen: an open Base Color, or the RGB node that feeds one."""
+    sockets = []
+    for node in material.node_tree.nodes if material.node_tree is not None else []:
+        base = node.inputs.get("Base Color")
+        if base is None:
+            continue
+        if not base.is_linked:
+            sockets.append(base)
+        elif base.links[0].from_node.type == "RGB":
+            sockets.append(base.links[0].from_node.outputs[0])
+    return sockets
