@@ -8,12 +8,11 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...core.mesh.triangle_mesh import BoolArray, IntArray
 from ..parts.part_style import Style
 from ..scene.attributes import OUR_HIDDEN_ATTRIBUTE, read_face_ints
 from ..scene.vertex_group_access import group_owner
 from .color_attribute import PART_COLORS
-from .face_sets import FACE_SET_ATTRIBUTE, FIRST_FACE_SET, OWN_FACE_SETS
+from .face_sets import OWN_FACE_SETS
 from .ledger import MARK, Ledger
 from .overrides import BY_HAND, MODEL_LABELS
 from .own_materials import KEYS, OWN_KEYS, OWN_MATERIALS
@@ -42,8 +41,7 @@ ATTRIBUTES = {
 def adopt(mesh: bpy.types.Mesh) -> None:
     """Enter what other objects brought with them into the ledger of a mesh, if it was joined with any."""
     marks, ledger = read_face_ints(mesh, OUR_HIDDEN_ATTRIBUTE), Ledger(mesh)
-    foreign = [] if marks is None else np.setdiff1d(marks, [0, ledger.get(MARK, 0)]).tolist()
-    if not foreign:
+    if marks is None or not len(np.setdiff1d(marks, [0, ledger.get(MARK, 0)])):
         return
     for key, (name, data_type, domain) in ATTRIBUTES.items():
         attribute = mesh.attributes.get(name)
@@ -52,21 +50,7 @@ def adopt(mesh: bpy.types.Mesh) -> None:
             ledger[key] = name
     labels = labels_on(mesh)
     if labels is not None:
-        _adopt_face_sets(mesh, ledger, labels, [marks == mark for mark in foreign])
         _adopt_groups(mesh, ledger, np.unique(labels).tolist())
-
-
-def _adopt_face_sets(mesh: bpy.types.Mesh, ledger: Ledger, labels: IntArray, joined: list[BoolArray]) -> None:
-    """Enter the face sets of objects whose faces are all in the sets of their parts."""
-    sets = read_face_ints(mesh, FACE_SET_ATTRIBUTE)
-    if sets is None:
-        return
-    ours = set(ledger.get("face_sets", []))
-    for faces in joined:
-        if (sets[faces] == labels[faces] + FIRST_FACE_SET).all() or "own_face_sets" in ledger:
-            ours |= set((np.unique(labels[faces]) + FIRST_FACE_SET).tolist())
-    if ours:
-        ledger["face_sets"] = sorted(ours)
 
 
 def _adopt_groups(mesh: bpy.types.Mesh, ledger: Ledger, parts: list[int]) -> None:

@@ -43,7 +43,6 @@ class Materials:
         if ledger.attribute("own_materials") is None and "first_slot" not in ledger:
             return
         slots = TakenBackSlots(mesh, ledger)
-        ours = {mesh.materials[i] for i in our_slots(mesh, ledger)}
         _warn_of_left(mesh, slots, ledger)
         ledger.remove("own_slots")  # which can hold on to a material as a user
         change_slots(mesh, slots.kept, slots.added)
@@ -52,7 +51,7 @@ class Materials:
             mesh.attributes.remove(mesh.attributes["material_index"])
         for key in ("own_materials", KEYS):
             ledger.remove_attribute(key)
-        for material in unused(ours):
+        for material in unused():
             if is_as_made(material):
                 remove(material)
 

@@ -107,7 +107,7 @@ class TakenBackSlots:
         if own < len(slots) and slots[own] == material:
             return own
         # Blender shows the last material on faces with an index beyond the last slot.
-        is_beyond = own >= len(recorded) and slots[: len(recorded)] == recorded
+        is_beyond = own >= len(slots) and slots[: len(recorded)] == recorded
         if is_beyond and material == (recorded[-1] if recorded else None):
             return own
         if material in slots:
@@ -120,7 +120,7 @@ class TakenBackSlots:
 
     def _fallen(self, mesh: bpy.types.Mesh, shown: IntArray) -> BoolArray:
         """Polygons in the slot to which Blender moved them when the slot of their part was removed."""
-        labels, fallen = labels_on(mesh), np.zeros(len(shown), dtype=bool)
+        labels, fallen = labels_on(mesh), np.full(len(shown), not self._slots)
         if labels is None or not self._slots:
             return fallen
         slot_of_part = {part_of(material): i for i, material in enumerate(self._slots)}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 
 import bpy
 import numpy as np
@@ -64,7 +63,7 @@ def restyle_material(material: bpy.types.Material, style: Style, name: bool, col
 
 def is_as_made(material: bpy.types.Material) -> bool:
     """Whether a material of ours is as it was made: content, name, and users, which are meshes with labels."""
-    if any(not (isinstance(user, bpy.types.Mesh) and has_ledger(user)) for user in users_of(material)[material]):
+    if not all(isinstance(user, bpy.types.Mesh) and has_ledger(user) for user in _users(material)[material]):
         return False
     made = _MADE.of(material)
     if made is not None and made.get("by") == bpy.app.version_string:
@@ -77,18 +76,31 @@ def keep_unused() -> list[str]:
 
     They are the artist's by now: all others are removed.
     """
-    kept = unused(material for material in bpy.data.materials if part_of(material) is not None)
+    kept = unused()
     for material in kept:
         on_failure(lambda material=material: setattr(material, "use_fake_user", False))
         material.use_fake_user = True
     return [material.name for material in kept]
 
 
-def unused(materials: Iterable[bpy.types.Material]) -> list[bpy.types.Material]:
-    """Those of some materials that nothing uses, and that will not be removed, ordered by name."""
-    candidates = sorted({m for m in materials if not (m.use_fake_user or is_removed(m))}, key=lambda m: m.name)
-    users = users_of(*candidates) if candidates else {}
-    return [material for material in candidates if all(is_removed(user) for user in users[material])]
+def unused() -> list[bpy.types.Material]:
+    """Our materials that nothing uses, without those that will be removed."""
+    ours = [material for material in bpy.data.materials if part_of(material) is not None]
+    candidates = [material for material in ours if not (material.use_fake_user or is_removed(material))]
+    users = _users(*candidates)
+    return [material for material in candidates if not users[material]]
+
+
+def _users(*materials: bpy.types.Material) -> dict[bpy.types.ID, list[bpy.types.ID]]:
+    """What uses materials, other than meshes that will be removed, or that no object has, as joined objects leave."""
+    return {
+        material: [user for user in users if not (is_removed(user) or _is_left_over(user))]
+        for material, users in users_of(*materials).items()
+    }
+
+
+def _is_left_over(block: bpy.types.ID) -> bool:
+    return isinstance(block, bpy.types.Mesh) and block.users == 0
 
 
 def without_number(name: str) -> str:

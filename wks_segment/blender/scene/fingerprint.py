@@ -27,7 +27,8 @@ CHANGING_BY_THEMSELVES = frozenset({
     "vertex_colors", "normal", "area", "center", "index", "texspace_location", "texspace_size", "pixels",
     # What was clicked on, or is open in a panel.
     "select", "select_control_point", "select_left_handle", "select_right_handle", "show_expanded", "mode",
-    "vertex_selection", "edge_selection", "select_edge", "uv_layer_clone", "uv_layer_stencil",
+    # Reading these adds attributes in Blender 4.2; attributes are read anyway.
+    "vertex_selection", "edge_selection", "pin", "select_edge", "uv_layer_clone", "uv_layer_stencil",
 })  # fmt: skip
 """Properties that change without work of an artist."""
 LASTING_CHOICES = ("active_render", "active_clone")
@@ -61,7 +62,7 @@ def fingerprint(*blocks: bpy.types.ID, ignored: Collection[str] = ()) -> str:
 def users_of(*blocks: bpy.types.ID) -> dict[bpy.types.ID, list[bpy.types.ID]]:
     """The data-blocks that use each data-block, ordered by name, other than windows, which show everything."""
     windows = (bpy.types.Screen, bpy.types.WindowManager, bpy.types.WorkSpace)
-    users = bpy.data.user_map(subset=blocks)
+    users = bpy.data.user_map(subset=blocks) if blocks else {}
     return {
         block: sorted((user for user in users[block] if not isinstance(user, windows)), key=label_of)
         for block in blocks

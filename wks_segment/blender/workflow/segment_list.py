@@ -17,6 +17,7 @@ from ..outputs.labels import rewrite_labels
 from ..outputs.overrides import by_hand, keep_by_hand, model_labels
 from ..outputs.part_attributes import has_labels, labels_on
 from ..outputs.part_materials import part_of, restyle_material
+from ..outputs.separate import followed
 from ..outputs.vertex_groups import rename_group
 from ..parts import part_ids
 from ..parts.palette import most_different
@@ -93,9 +94,10 @@ def activate(settings: WKSSegmentSettings, part: int) -> None:
 
 def rewrite_all(settings: WKSSegmentSettings, objects: list[bpy.types.Object] | None = None) -> None:
     """Write the labels of objects (None: of all in the scene) again with the user's current edits, and list them."""
-    notes = settings.notes()
-    for mesh in meshes_of(labeled(settings, everywhere=True) if objects is None else objects):
-        rewrite_labels(mesh, settings.style(), notes.joined)
+    notes, written = settings.notes(), labeled(settings, everywhere=True) if objects is None else objects
+    with followed(written):
+        for mesh in meshes_of(written):
+            rewrite_labels(mesh, settings.style(), notes.joined)
     fill(settings)
 
 
@@ -131,16 +133,17 @@ def recolor(settings: WKSSegmentSettings, part: int, color: tuple[float, float, 
 
 def restyle(settings: WKSSegmentSettings, part: int, name: bool = True, color: bool = True) -> None:
     """Write the current name or color of a part wherever it is written already."""
-    style = settings.style()
-    meshes = meshes_of(labeled(settings, everywhere=True))
-    for mesh in meshes if name else ():
-        rename_group(mesh, part, style)
-    with leaving_edit_mode(bpy.context) if color else nullcontext():
-        for mesh in meshes if color else ():
-            recolor_faces(mesh, part, style)
-    for material in bpy.data.materials:
-        if part_of(material) == part:
-            restyle_material(material, style, name, color)
+    style, objects = settings.style(), labeled(settings, everywhere=True)
+    with leaving_edit_mode(bpy.context) if color else nullcontext(), followed(objects):
+        # A mesh can be in Edit Mode in another window.
+        for mesh in (mesh for mesh in meshes_of(objects) if not mesh.is_editmode or not color):
+            if name:
+                rename_group(mesh, part, style)
+            if color:
+                recolor_faces(mesh, part, style)
+        for material in bpy.data.materials:
+            if part_of(material) == part:
+                restyle_material(material, style, name, color)
 
 
 def make_part(settings: WKSSegmentSettings, name: str, side: int = 0) -> int:
