@@ -80,7 +80,6 @@ STEPS = {
     "apply": lambda settings: OPS.apply(),
     "live": live,
     "learn fewer": learn_fewer,
-    "styled": styled,
     "turned off": turned_off,
     "clear": lambda settings: OPS.clear(),
 }
@@ -98,6 +97,23 @@ def test_a_changed_material_stays_as_it_is(obj, settings, tmp_path, work, step):
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
     assert state(bpy.data.materials[before[0]]) == before, "also in the file"
+
+
+@pytest.mark.parametrize("work", WORK)
+def test_a_new_name_and_color_of_a_segment_leave_what_the_artist_chose(obj, settings, work):
+    material = bpy.data.materials[NAME]
+    WORK[work](material)
+    before, base = state(material), tuple(shader(material).inputs["Base Color"].default_value)
+    styled(settings)
+    after = state(material)
+    if work == "used elsewhere":
+        assert after == before
+        return
+    assert after[1:3] + after[4:] == before[1:3] + before[4:]
+    assert after[0] == ("Hero Skin" if work == "name" else "Belly")
+    assert (tuple(shader(material).inputs["Base Color"].default_value) == base) == (work == "color")
+    OPS.clear()
+    assert material.name == after[0], "it is still there"
 
 
 def test_new_labels_use_the_changed_material(obj, settings):

@@ -75,7 +75,7 @@ class TakenBackSlots:
         index, ours = read_ints(mesh.polygons, "material_index"), our_slots(mesh, ledger)
         shown = np.minimum(index, max(len(self._slots) - 1, 0))
         in_ours = np.isin(shown, ours)
-        given_back = in_ours | self._fallen(mesh, shown)
+        given_back = in_ours | self._fallen(mesh, ledger, shown)
         own, keys = self._before_ours(mesh, ledger)
         is_known = (keys == BY_INDEX) | np.isin(keys, list(known))
         self.left = in_ours & ~is_known
@@ -118,11 +118,13 @@ class TakenBackSlots:
         self.added.append(material)
         return len(slots)
 
-    def _fallen(self, mesh: bpy.types.Mesh, shown: IntArray) -> BoolArray:
+    def _fallen(self, mesh: bpy.types.Mesh, ledger: Ledger, shown: IntArray) -> BoolArray:
         """Polygons in the slot to which Blender moved them when the slot of their part was removed."""
-        labels, fallen = labels_on(mesh), np.full(len(shown), not self._slots)
-        if labels is None or not self._slots:
+        labels, fallen = labels_on(mesh), np.zeros(len(shown), dtype=bool)
+        if labels is None or ledger.attribute("own_materials") is None:
             return fallen
+        if not self._slots:
+            return ~fallen
         slot_of_part = {part_of(material): i for i, material in enumerate(self._slots)}
         before = [self._slots.index(material) for material in self._recorded if material in self._slots]
         for part in part_ids.unique_parts(labels):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import bpy
 import numpy as np
@@ -21,8 +22,10 @@ TEMPLATE_PROPERTY = "wks_segment_template"
 """Custom property of our materials that are copies: the name of the material that they were copied from."""
 OTHER_DEFAULTS = ("location", "location_absolute", "use_backface_culling_lightprobe_volume")
 """Properties of new materials that are not the same in Blender 4.2 and 5.2; they do not change a look."""
+SAME_COLOR = 1e-5
+"""Largest difference of channels of a color that was set, as Blender rounds them to single precision."""
 _MADE = OwnProperty("wks_segment_made", "as")
-"""Custom property of our materials: name ("name") and fingerprint ("as") as made, in this version of Blender ("by")."""
+"""Custom property of our materials: name, color and fingerprint ("as") as made, in this version of Blender ("by")."""
 
 
 def part_of(material: bpy.types.Material | None) -> int | None:
@@ -42,33 +45,46 @@ def material_of_part(part: int, style: Style, template: bpy.types.Material | Non
 
 
 def restyle_material(material: bpy.types.Material, style: Style, name: bool, color: bool) -> None:
-    """Give a material of ours the name and the color of its part in a style, unless it is the artist's by now."""
+    """Give a material of ours the name and the color of its part in a style.
+
+    A name or a color that the artist has chosen stays, and so does a material that is used elsewhere.
+    """
     part = part_of(material)
-    if part is None or material.library is not None or not is_as_made(material):
+    if part is None or material.library is not None or not _is_ours_alone(material):
         return
-    old_name, old_color = material.name, tuple(material.diffuse_color)
+    was_as_made, made = is_as_made(material), _made_of(material)
+    old_name, old_colors = material.name, [(place, tuple(getattr(*place))) for place in _color_places(material)]
 
     def bring_back() -> None:
         material.name = old_name
-        _paint(material, old_color)
-        _enter(material)
+        for place, value in old_colors:
+            setattr(*place, value)
+        _MADE.put(material, made)
 
     on_failure(bring_back)
-    if name and without_number(material.name) != style.name_of(part):
-        material.name = style.name_of(part)
+    entries = dict(made)
+    if name and without_number(material.name) == without_number(made["name"]):
+        if without_number(material.name) != style.name_of(part):
+            material.name = style.name_of(part)
+        entries["name"] = material.name
     if color:
-        _paint(material, _color_of(part, style))
-    _enter(material)
+        entries["color"] = _color_of(part, style)
+        for place, value in old_colors:
+            if np.allclose(value, made["color"], atol=SAME_COLOR):
+                setattr(*place, entries["color"])
+    _MADE.put(material, entries)
+    if was_as_made:
+        _enter(material, entries["color"])
 
 
 def is_as_made(material: bpy.types.Material) -> bool:
     """Whether a material of ours is as it was made: content, name, and users, which are meshes with labels."""
-    if not all(isinstance(user, bpy.types.Mesh) and has_ledger(user) for user in _users(material)[material]):
+    if not _is_ours_alone(material):
         return False
-    made = _MADE.of(material)
-    if made is not None and made.get("by") == bpy.app.version_string:
+    made = _made_of(material)
+    if made.get("by") == bpy.app.version_string:
         return without_number(material.name) == without_number(made["name"]) and fingerprint(material) == made["as"]
-    return _is_like_new(material, None if made is None else made["name"])
+    return _is_like_new(material, made["name"])
 
 
 def keep_unused() -> list[str]:
@@ -122,8 +138,9 @@ def _new_material(part: int, style: Style, template: bpy.types.Material | None) 
         if material.asset_data is not None:
             material.asset_clear()
     material[PART_PROPERTY] = part
-    _paint(material, _color_of(part, style))
-    _enter(material)
+    color = _color_of(part, style)
+    _paint(material, color)
+    _enter(material, color)
     return material
 
 
@@ -133,22 +150,36 @@ def _color_of(part: int, style: Style) -> tuple[float, ...]:
 
 def _paint(material: bpy.types.Material, color: tuple[float, ...]) -> None:
     """Set the color in Solid view, and where the shader has a color of its own."""
-    material.diffuse_color = color
-    for socket in _color_sockets(material):
-        socket.default_value = color
+    for place in _color_places(material):
+        setattr(*place, color)
 
 
-def _enter(material: bpy.types.Material) -> None:
+def _enter(material: bpy.types.Material, color: tuple[float, ...]) -> None:
     """Keep how the material is made."""
-    _MADE.put(material, {"name": material.name, "as": fingerprint(material), "by": bpy.app.version_string})
+    by = bpy.app.version_string
+    _MADE.put(material, {"name": material.name, "color": color, "as": fingerprint(material), "by": by})
 
 
-def _is_like_new(material: bpy.types.Material, name: str | None) -> bool:
-    """Whether a material that another version has made is like one that is made now."""
-    part = part_of(material)
+def _made_of(material: bpy.types.Material) -> dict[str, Any]:
+    """How a material was made, as far as files of older versions know."""
+    made, part = _MADE.of(material), part_of(material)
+    if made is not None:
+        return dict(made.to_dict())
     assert part is not None
-    names = {default_name(part)} | {scene.wks_segment.style().name_of(part) for scene in bpy.data.scenes}
-    if without_number(material.name) not in (names if name is None else {without_number(name)}):
+    names = [default_name(part), *(scene.wks_segment.style().name_of(part) for scene in bpy.data.scenes)]
+    name = next((name for name in names if name == without_number(material.name)), names[0])
+    return {"name": name, "color": tuple(material.diffuse_color)}
+
+
+def _is_ours_alone(material: bpy.types.Material) -> bool:
+    """Whether only meshes with labels use a material."""
+    return all(isinstance(user, bpy.types.Mesh) and has_ledger(user) for user in _users(material)[material])
+
+
+def _is_like_new(material: bpy.types.Material, name: str) -> bool:
+    """Whether a material that another version has made is like one of this name that is made now."""
+    part = part_of(material)
+    if part is None or without_number(material.name) != without_number(name):
         return False
     template = bpy.data.materials.get(material.get(TEMPLATE_PROPERTY, ""))
     new = _new_material(part, Style(), template)
@@ -157,6 +188,11 @@ def _is_like_new(material: bpy.types.Material, name: str | None) -> bool:
         return fingerprint(new, ignored=OTHER_DEFAULTS) == fingerprint(material, ignored=OTHER_DEFAULTS)
     finally:
         bpy.data.materials.remove(new)
+
+
+def _color_places(material: bpy.types.Material) -> list[tuple[Any, str]]:
+    """What has a color of the part, and the name of the property."""
+    return [(material, "diffuse_color"), *((socket, "default_value") for socket in _color_sockets(material))]
 
 
 def _color_sockets(material: bpy.types.Material) -> list[bpy.types.NodeSocket]:
