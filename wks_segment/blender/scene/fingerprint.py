@@ -89,7 +89,7 @@ class _Reader:
         yield from self._struct(block, 0)
         if isinstance(block, bpy.types.Mesh):
             yield from _mesh_arrays(block)
-        if isinstance(block, bpy.types.Image) and block.has_data:
+        if isinstance(block, bpy.types.Image):
             yield read_pixels(block).tobytes()
         self._animated = before
 

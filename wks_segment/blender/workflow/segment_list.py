@@ -24,6 +24,7 @@ from ..parts.palette import most_different
 from ..props.settings import WKSSegmentSettings
 from ..scene.attributes import read_bools, read_floats
 from ..scene.characters import Character, mesh_objects, polygon_ranges, with_rigged
+from .all_or_nothing import all_or_nothing
 
 SUCCESSOR_OVERLAP = 0.5
 """Common area of an old and a new part, as a share of what they cover together, above which the new part is the old
@@ -210,7 +211,10 @@ def _successors(labels: Mapping[Character, IntArray]) -> dict[int, int]:
 
 @contextmanager
 def leaving_edit_mode(context: bpy.types.Context) -> Iterator[None]:
-    """Leave Edit Mode for the block, because Blender reads and writes whole attributes only outside it."""
+    """Leave Edit Mode for the block, because Blender reads and writes whole attributes only outside it.
+
+    An error in the block leaves everything as it was before.
+    """
     if context.mode != "EDIT_MESH":
         yield
         return
@@ -218,7 +222,8 @@ def leaving_edit_mode(context: bpy.types.Context) -> Iterator[None]:
     selected = {obj: obj.select_get() for obj in context.view_layer.objects}
     bpy.ops.object.mode_set(mode="OBJECT")
     try:
-        yield
+        with all_or_nothing(context):
+            yield
     finally:
         # Blender enters Edit Mode with all selected objects.
         for obj in selected:

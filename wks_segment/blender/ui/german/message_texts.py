@@ -159,6 +159,9 @@ GERMAN_MESSAGES = {
     '{count} faces of "{mesh}" keep {materials}: which material they had before is not known': (
         '{count} Flächen von "{mesh}" behalten {materials}: welches Material sie vorher hatten, ist nicht bekannt'
     ),
+    'The image "{name}" has been changed since it was baked, and stays': (
+        'Das Bild "{name}" wurde seit dem Backen geändert und bleibt'
+    ),
     "You have changed these materials, they stay in the file: {names}": (
         "Diese Materialien haben Sie geändert, sie bleiben in der Datei: {names}"
     ),

@@ -1,0 +1,150 @@
+"""An error at any point of writing leaves everything as it was.
+
+Each operator is run again and again, and each time another line of the writers raises: all lines in turn.
+"""
+
+import sys
+from pathlib import Path
+
+import bpy
+import pytest
+from builders import changes, groups_snapshot, limbed, mesh_object, scene_snapshot, select
+from height_bands import bands
+from painted_objects import painted
+
+from wks_segment.blender.outputs.labels import write_labels
+from wks_segment.blender.outputs.options import OutputOptions
+
+pytestmark = pytest.mark.usefixtures("scene")
+OPS = bpy.ops.wks_segment
+PACKAGE = Path(sys.modules["wks_segment"].__file__).parent / "blender"
+BRING_BACK = {
+    "restore_point.py", "mesh_state.py", "property_state.py", "material_slots.py", "all_or_nothing.py", "ledger.py",
+    "own_property.py",
+}  # fmt: skip
+"""Modules that bring back what was there, or that only help others to write."""
+WRITERS = {
+    str(path)
+    for path in [*(PACKAGE / "outputs").glob("*.py"), *(PACKAGE / "workflow").glob("*.py")]
+    if path.name not in BRING_BACK
+}
+
+
+class InjectedError(Exception):
+    """The error that is raised."""
+
+
+class Injector:
+    """Raises at the first line of the writers that is new; the lines that have raised are known."""
+
+    def __init__(self):
+        self.raised = set()
+        self.on = False
+
+    def __call__(self, frame, event, argument):
+        if not self.on or frame.f_code.co_filename not in WRITERS:
+            return None
+        return self.line
+
+    def line(self, frame, event, argument):
+        place = frame.f_code.co_filename, frame.f_lineno
+        if self.on and event == "line" and place not in self.raised and not in_bring_back(frame):
+            self.raised.add(place)
+            self.on = False
+            raise InjectedError(f"{Path(place[0]).name}:{place[1]}")
+        return self.line
+
+
+def in_bring_back(frame):
+    while frame is not None:
+        if frame.f_code.co_name in ("restore", "finish", "bring_back", "leaving_edit_mode", "poll"):
+            return True
+        frame = frame.f_back
+    return False
+
+
+@pytest.fixture
+def character(settings):
+    """A small object of an artist with everything, labeled with everything, and with an ID map."""
+    points, faces = small()
+    obj = painted(mesh_object(points, faces, "Limbed"))
+    obj.vertex_groups[0].lock_weight = True
+    settings.write_materials = settings.write_face_sets = settings.write_seams = settings.bake_unwrap = True
+    settings.vertex_groups, settings.bake_size = "hard", 64
+    options = OutputOptions(materials=True, vertex_groups="hard", face_sets=True, seams=True)
+    write_labels(obj.data, bands(obj), options)
+    select(obj)
+    OPS.refresh_segments()
+    OPS.bake()
+    return obj
+
+
+def small():
+    obj = limbed("Small", subdivisions=1)
+    points = [tuple(vertex.co) for vertex in obj.data.vertices]
+    faces = [tuple(polygon.vertices) for polygon in obj.data.polygons]
+    mesh = obj.data
+    bpy.data.objects.remove(obj)
+    bpy.data.meshes.remove(mesh)
+    return points, faces
+
+
+def in_edit_mode(operator):
+    def run():
+        bpy.ops.object.mode_set(mode="EDIT")
+        try:
+            operator()
+        finally:
+            bpy.ops.object.mode_set(mode="OBJECT")
+
+    return run
+
+
+def separated_and_cleared():
+    OPS.separate()
+    return OPS.clear
+
+
+OPERATORS = {
+    "segments from face sets": lambda: lambda: OPS.segments_from(source="FACE_SETS"),
+    "clear": lambda: OPS.clear,
+    "separate": lambda: OPS.separate,
+    "clear of separated objects": separated_and_cleared,
+    "unwrap": lambda: OPS.unwrap,
+    "bake": lambda: OPS.bake,
+    "merge": lambda: lambda: OPS.merge_segments(into=1),
+    "new segment": lambda: in_edit_mode(lambda: OPS.new_segment(name="Mine")),
+}
+
+
+def state():
+    materials = {
+        material.name: (tuple(material.diffuse_color), material.use_fake_user, material.users)
+        for material in bpy.data.materials
+    }
+    groups = {obj.name: groups_snapshot(obj) for obj in bpy.data.objects if obj.type == "MESH"}
+    return {**scene_snapshot(), "looks": materials, "weights": groups, "meshes in the file": bpy.data.meshes.keys()}
+
+
+@pytest.mark.parametrize("name", OPERATORS)
+def test_an_error_leaves_everything_as_it_was(character, name):
+    operator = OPERATORS[name]()
+    before, injector = state(), Injector()
+    traced, tried = sys.gettrace(), 0
+    while True:
+        injector.on, failed = True, ""
+        sys.settrace(injector)
+        try:
+            operator()
+        except RuntimeError as error:
+            failed = str(error)
+        finally:
+            sys.settrace(traced)
+            reached_all, injector.on = injector.on, False
+        if reached_all:
+            break
+        assert "Injected" in failed, f"{failed}: the error was swallowed"
+        tried += 1
+        assert not changes(before, state()), failed.splitlines()[-2:]
+    assert tried > 20
+    assert changes(before, state()), "without an error it writes"
