@@ -44,6 +44,7 @@ class MeshState:
     def restore(self) -> None:
         """Bring everything back."""
         mesh = self._mesh
+        self._slots.restore(mesh)  # which changes the attribute of the faces' slots
         now = _attributes(mesh)
         for name, state in now.items():
             before = self._attributes.get(name)
@@ -60,7 +61,6 @@ class MeshState:
         for name in SEAM_ATTRIBUTES:
             if name in mesh.attributes and name not in self._attributes and not self._seams.any():
                 mesh.attributes.remove(mesh.attributes[name])
-        self._slots.restore(mesh)
         self._restore_actives()
         for name in _our_properties(mesh):
             del mesh[name]
@@ -72,10 +72,11 @@ class MeshState:
         """Make all vertex groups again, unless they are as they were."""
         mesh = self._mesh
         with group_owner(mesh) as owner:
-            if [(group.name, group.lock_weight) for group in owner.vertex_groups] != self._groups:
-                removed = {name for _, name, _ in self._weights}
-                names = [group.name for group in owner.vertex_groups]
-                weights = [*self._weights, *_weights(mesh, names, {name for name, _ in self._groups} - removed)]
+            names = [group.name for group in owner.vertex_groups]
+            removed = {name for _, name, _ in self._weights}
+            is_same = [(group.name, group.lock_weight) for group in owner.vertex_groups] == self._groups
+            if not is_same or _weights(mesh, names, removed) != self._weights:
+                weights = [*_weights(mesh, names, {name for name, _ in self._groups} - removed), *self._weights]
                 owner.vertex_groups.clear()
                 for name, locked in self._groups:
                     owner.vertex_groups.new(name=name).lock_weight = locked
