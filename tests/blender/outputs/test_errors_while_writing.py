@@ -33,7 +33,7 @@ WRITERS = {
 
 
 WRITING = {"write", "take_back", "write_labels", "clear_labels", "separate", "unite", "write_id_map", "write_uv_map"}
-"""Functions of which every line raises; of others the first one."""
+"""Functions of which every line raises in turn: what they call is complete or raises there."""
 
 
 class InjectedError(Exception):
@@ -49,10 +49,8 @@ class Injector:
         self.on = False
 
     def __call__(self, frame, event, argument):
-        if not self.on or frame.f_code.co_filename not in self.files or in_bring_back(frame):
-            return None
-        self.step(frame)
-        return self.line if frame.f_code.co_name in WRITING else None
+        is_writing = frame.f_code.co_filename in self.files and frame.f_code.co_name in WRITING
+        return self.line if self.on and is_writing and not in_bring_back(frame) else None
 
     def line(self, frame, event, argument):
         if self.on and event == "line":
@@ -127,16 +125,21 @@ def unwrapped():
     return OPS.unwrap
 
 
+def in_other_colors():
+    bpy.context.scene.wks_segment.palette = "maximal"
+    return lambda: OPS.segments_from(source="FACE_SETS")
+
+
 def bake_smaller():
     bpy.context.scene.wks_segment.bake_size = 32
     return OPS.bake
 
 
 OPERATORS = {
-    "segments from face sets": (lambda: lambda: OPS.segments_from(source="FACE_SETS"), ()),
+    "segments from face sets": (in_other_colors, ()),
     "clear": (lambda: OPS.clear, ()),
     "separate": (lambda: OPS.separate, ()),
-    "clear of separated objects": (separated_and_cleared, ("separate.py", "labels.py", "materials.py", "id_map.py")),
+    "clear of separated objects": (separated_and_cleared, ("separate.py", "id_map.py")),
     "unwrap": (unwrapped, ()),
     "bake": (bake_smaller, ("id_map.py",)),
     "new segment": (lambda: in_edit_mode(lambda: OPS.new_segment(name="Mine")), ()),
