@@ -79,13 +79,14 @@ def character(settings):
     points, faces = small()
     obj = painted(mesh_object(points, faces, "Limbed"))
     obj.vertex_groups[0].lock_weight = True
+    for loop, uv in zip(obj.data.loops, obj.data.uv_layers["Second"].uv, strict=True):
+        uv.vector = [0.5 + 0.15 * number for number in obj.data.vertices[loop.vertex_index].co.xy]
     settings.write_materials = settings.write_face_sets = settings.write_seams = settings.bake_unwrap = True
     settings.vertex_groups, settings.bake_size = "hard", 64
     options = OutputOptions(materials=True, vertex_groups="hard", face_sets=True, seams=True)
     write_labels(obj.data, bands(obj), options)
     select(obj)
     OPS.refresh_segments()
-    OPS.unwrap(method="SMART")
     OPS.bake()
     return obj
 

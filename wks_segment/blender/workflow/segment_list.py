@@ -40,7 +40,8 @@ def labeled(settings: WKSSegmentSettings, everywhere: bool = False) -> list[bpy.
     local = [obj for obj in mesh_objects(with_labels) if obj.library is None and obj.data.library is None]
     if everywhere:
         return local
-    in_edit_mode = [obj for obj in local if obj.mode == "EDIT"]
+    # In Object Mode, an object is in Edit Mode only in another window or beside the active one.
+    in_edit_mode = [obj for obj in local if obj.mode == "EDIT" and bpy.context.mode == "EDIT_MESH"]
     objects = settings.id_data.objects
     selected = with_rigged((obj for obj in objects if obj.select_get()), (obj for obj in objects if obj.visible_get()))
     return in_edit_mode or [obj for obj in local if obj in selected] or local
@@ -59,7 +60,7 @@ def fill(settings: WKSSegmentSettings) -> None:
     settings.faces_by_hand = 0
     for obj in labeled(settings):
         labels = labels_on(obj.data)
-        if labels is None:
+        if labels is None or (obj.data.is_editmode and bpy.context.mode != "EDIT_MESH"):
             continue
         # An object's scale counts, since the objects of a character can have different ones.
         scale = abs(np.linalg.det(np.array(obj.matrix_world)[:3, :3])) ** (2 / 3)
