@@ -32,7 +32,10 @@ WRITERS = {
 }
 
 
-WRITING = {"write", "take_back", "write_labels", "clear_labels", "separate", "unite", "write_id_map", "write_uv_map"}
+WRITING = {
+    "write", "take_back", "write_labels", "clear_labels", "separate", "unite", "write_id_map", "write_uv_map",
+    "write_outputs", "rewrite_all", "keep", "_keep", "store_active",
+}  # fmt: skip
 """Functions of which every line raises in turn: what they call is complete or raises there."""
 
 
@@ -131,6 +134,14 @@ def in_other_colors():
     return lambda: OPS.segments_from(source="FACE_SETS")
 
 
+def learned():
+    settings = bpy.context.scene.wks_segment
+    settings.n_segments, settings.vertex_groups = 2, "none"
+    OPS.learn()
+    settings.n_segments = 3
+    return OPS.learn
+
+
 def bake_smaller():
     bpy.context.scene.wks_segment.bake_size = 32
     return OPS.bake
@@ -143,6 +154,8 @@ OPERATORS = {
     "clear of separated objects": (separated_and_cleared, ("separate.py", "id_map.py")),
     "unwrap": (unwrapped, ()),
     "bake": (bake_smaller, ("id_map.py",)),
+    "learn": (learned, ("segmentation_job.py", "pipeline.py", "model_library.py", "live_session.py")),
+    "merge": (lambda: lambda: OPS.merge_segments(into=1), ("segment_list.py", "labels.py")),
     "new segment": (lambda: in_edit_mode(lambda: OPS.new_segment(name="Mine")), ()),
 }
 """What is run, and the modules whose steps raise, if not those of all: some operators compute for long."""

@@ -77,7 +77,7 @@ def write_id_map(
     write_pixels(image, colors[row.reshape(part_map.shape)])
     image.update()
     image.pack()
-    _MADE.put(image, {"pixels": _hash_of(image), "as": fingerprint(image), "by": bpy.app.version_string})
+    _MADE.put(image, {"pixels": _hash_of(image), "as": _fingerprint_of(image), "by": bpy.app.version_string})
     for ledger in ledgers:
         ledger["id_map"] = image.name
     for old_name in dict.fromkeys(old_names):
@@ -123,7 +123,12 @@ def _is_as_made(image: bpy.types.Image) -> bool:
         return not image.is_dirty
     if made["by"] != bpy.app.version_string:
         return bool(made["pixels"] == _hash_of(image))
-    return bool(made["as"] == fingerprint(image))
+    return bool(made["as"] == _fingerprint_of(image))
+
+
+def _fingerprint_of(image: bpy.types.Image) -> str:
+    # The resolution is rounded when the image is read from a file.
+    return fingerprint(image, ignored=("resolution",))
 
 
 def _hash_of(image: bpy.types.Image) -> str:
@@ -141,7 +146,7 @@ def _keep_pixels(image: bpy.types.Image) -> None:
         image.update()
         image.pack()
         if entries is not None:
-            _MADE.put(image, {**entries, "as": fingerprint(image)})
+            _MADE.put(image, {**entries, "as": _fingerprint_of(image)})
 
     if made is not None:
         on_failure(bring_back)
