@@ -146,6 +146,17 @@ def test_materials_as_made_are_restyled_and_removed(obj, settings):
     assert sorted(bpy.data.materials.keys()) == ["Cloth", "Skin"]
 
 
+def test_a_changed_copy_of_our_material_in_one_more_slot_stays_on_its_faces(obj):
+    mine = bpy.data.materials[NAME].copy()
+    mine.name = "Mine"
+    new_node(mine)
+    obj.data.materials.append(mine)
+    obj.data.polygons[7].material_index = len(obj.data.materials) - 1
+    OPS.clear()
+    assert [material.name for material in obj.data.materials] == ["Skin", "Cloth", "Mine"]
+    assert [polygon.material_index for polygon in obj.data.polygons][5:9] == [1, 0, 2, 0]
+
+
 def test_a_changed_copy_of_a_template_stays(settings):
     template = bpy.data.materials.new("Rough")
     if bpy.app.version < (5, 0, 0):

@@ -14,7 +14,7 @@ NAMES = (
     "wks_segment_note", "wks_segment_piece", "wks_segment_whole", "wks_segment_component", "wks_segment_template",
     "wks_segment_made", "wks_segment_id_map", "wks_segment_id_map_made", "wks_segment_note.001",
 )  # fmt: skip
-VALUES = {"text": "mine", "number": 3, "group": {"of": "mine", "mine": 1}, "list": [1, 2, 3]}
+VALUES = {"text": "mine", "number": 3, "group": {"of": "mine", "on": 1}, "list": [1, 2, 3]}
 
 
 def kept(block):

@@ -18,7 +18,7 @@ from ..parts import part_ids
 from ..scene.attributes import read_attribute, read_ints
 from .ledger import Ledger, has_ledger
 from .part_attributes import labels_on
-from .part_materials import part_of
+from .part_materials import is_as_made, part_of
 
 OWN_MATERIALS = "wks_segment_own_material"
 """Face attribute that keeps the material index that each face had before ours."""
@@ -42,14 +42,18 @@ def our_slots(mesh: bpy.types.Mesh, ledger: Ledger) -> list[int]:
         return []
     # A material of ours that the artist had put into a slot before is the artist's there.
     own = [material for material in ledger.get("own_slots", {}).values() if part_of(material) is not None]
-    found = []
+    found: list[int] = []
+    parts: set[int] = set()
     for index, material in enumerate(mesh.materials):
-        if part_of(material) is None:
+        part = part_of(material)
+        if part is None:
             continue
         if material in own:
             own.remove(material)
-        else:
+        # A changed copy of our material in one more slot is the artist's.
+        elif part not in parts or is_as_made(material):
             found.append(index)
+            parts.add(part)
     return found
 
 

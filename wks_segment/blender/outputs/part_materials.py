@@ -78,9 +78,7 @@ def restyle_material(material: bpy.types.Material, style: Style, name: bool, col
 
 
 def is_as_made(material: bpy.types.Material) -> bool:
-    """Whether a material of ours is as it was made: content, name, and users, which are meshes with labels."""
-    if not _is_ours_alone(material):
-        return False
+    """Whether a material of ours has the content and the name that it was made with."""
     made = _made_of(material)
     if made.get("by") == bpy.app.version_string:
         return without_number(material.name) == without_number(made["name"]) and fingerprint(material) == made["as"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from zlib import crc32
 
@@ -21,7 +21,7 @@ from .part_attributes import labels_on
 from .part_materials import without_number
 from .restore_point import on_failure, remove
 
-_SEPARATED = OwnProperty("wks_segment_piece", "of")
+_SEPARATED = OwnProperty("wks_segment_piece", "as")
 """Custom property of a separated object: the original ("of"), and a fingerprint ("as") of the object as this version of
 Blender ("by") made it."""
 _ORIGINAL = OwnProperty("wks_segment_whole", "eye")
@@ -54,7 +54,7 @@ def original_of(obj: bpy.types.Object) -> bpy.types.Object | None:
     if _ORIGINAL.of(obj) is not None:
         return obj
     made = _SEPARATED.of(obj)
-    original = None if made is None else made["of"]
+    original = None if made is None else made.get("of")
     return original if isinstance(original, bpy.types.Object) else None
 
 
@@ -116,12 +116,13 @@ def is_as_made(obj: bpy.types.Object) -> bool:
 
 
 @contextmanager
-def followed(objects: list[bpy.types.Object]) -> Iterator[None]:
+def followed(objects: Iterable[bpy.types.Object]) -> Iterator[None]:
     """Let separated objects among some objects stay as made by us while we write to them."""
-    ours = [obj for obj in objects if _SEPARATED.of(obj) is not None and is_as_made(obj)]
+    separated = {obj: original for obj in objects if (original := original_of(obj)) not in (None, obj)}
+    ours = [obj for obj in separated if is_as_made(obj)]
     yield
     for obj in ours:
-        _enter(_SEPARATED.of(obj)["of"], [obj])
+        _enter(separated[obj], [obj])
 
 
 def _make(obj: bpy.types.Object, labels: IntArray, part: int, style: Style) -> bpy.types.Object:
