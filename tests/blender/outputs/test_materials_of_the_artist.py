@@ -17,7 +17,7 @@ NAME = "Segment 2"
 @pytest.fixture
 def obj(settings):
     settings.write_materials = True
-    obj = painted(limbed())
+    obj = painted(limbed(subdivisions=3))
     select(obj)
     OPS.learn()
     return obj
