@@ -90,7 +90,7 @@ WORK = {
     "shape key range": lambda piece: setattr(piece.data.shape_keys.key_blocks["Bulge"], "slider_max", 2.0),
     "driver": driver,
     "custom property": lambda piece: piece.__setitem__("export", "hand"),
-    "custom property of the mesh": lambda piece: piece.data.__setitem__("lod", 2),
+    "custom property of the mesh": lambda piece: piece.data.__setitem__("detail", 2),
     "constraint": lambda piece: piece.constraints.new("COPY_LOCATION"),
     "name": lambda piece: setattr(piece, "name", "Hand"),
     "name of the mesh": lambda piece: setattr(piece.data, "name", "Hand"),
