@@ -25,11 +25,32 @@ def pieces(settings):
     obj.data.shape_keys.key_blocks["Bulge"].keyframe_insert("value", frame=11)
     obj.shape_key_add(name="Thin")
     obj.modifiers.new("Sub", "SUBSURF").levels = 0
-    obj["export"] = "body"
+    obj["export"], obj["is_body"] = "body", True
+    obj.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    obj.modifiers.new("Nodes", "NODES").node_group = node_group()
     write_labels(obj.data, stripes(obj.data), OutputOptions(materials=True, vertex_groups="hard", seams=True))
     select(obj)
     OPS.separate()
     return [other for other in bpy.data.objects if other is not obj]
+
+
+def node_group():
+    """A group of Geometry Nodes that changes nothing, with an input."""
+    group = bpy.data.node_groups.new("Nothing", "GeometryNodeTree")
+    for name, kind, way in (
+        ("Geometry", "Geometry", "INPUT"),
+        ("Size", "Float", "INPUT"),
+        ("Out", "Geometry", "OUTPUT"),
+    ):
+        group.interface.new_socket(name, in_out=way, socket_type=f"NodeSocket{kind}")
+    group.links.new(group.nodes.new("NodeGroupInput").outputs[0], group.nodes.new("NodeGroupOutput").inputs[0])
+    return group
+
+
+def node_input(piece):
+    modifier = piece.modifiers["Nodes"]
+    name = next(name for name in modifier.keys() if isinstance(modifier[name], float))  # noqa: SIM118
+    modifier[name] = 0.5
 
 
 def attribute(name, domain, elements, kind="FLOAT"):
@@ -70,6 +91,8 @@ def driver(piece):
 WORK = {
     "vertex": lambda piece: setattr(piece.data.shape_keys.key_blocks[0].data[0], "co", (9, 9, 9)),
     "modifier setting": lambda piece: setattr(piece.modifiers["Sub"], "render_levels", 3),
+    "input of nodes": node_input,
+    "particles": lambda piece: setattr(piece.particle_systems[0], "seed", 7),
     "new modifier": lambda piece: piece.modifiers.new("Bend", "SIMPLE_DEFORM"),
     "seam": lambda piece: setattr(piece.data.edges[0], "use_seam", not piece.data.edges[0].use_seam),
     "sharp edge": lambda piece: setattr(piece.data.edges[0], "use_edge_sharp", True),

@@ -203,7 +203,8 @@ def _plain(value: Any) -> Any:
         return value.to_list()
     if not isinstance(value, str) and hasattr(value, "__len__"):
         return [_plain(each) for each in value]
-    return repr(value)
+    # Custom properties that are true or false can be numbers when a file is opened again.
+    return repr(int(value) if isinstance(value, bool) else value)
 
 
 def _path(struct: Any, name: str) -> str:
