@@ -148,6 +148,23 @@ GERMAN_MESSAGES = {
     '"{name}" is an instance: make it real first (Object > Apply > Make Instances Real)': '"{name}" ist eine Instanz: erst ein echtes Objekt daraus machen (Object > Apply > Make Instances Real)',
     '"{name}" is linked from another file: make it local first (Object > Relations)': '"{name}" ist aus einer anderen Datei verknüpft: erst lokal machen (Object > Relations)',
     '"{name}" is in Edit Mode: leave it first (Tab)': '"{name}" ist im Edit-Modus: ihn erst verlassen (Tab)',
+    '"{name}" is in Edit Mode through "{other}", which has the same mesh: leave it first (Tab)': (
+        '"{name}" ist durch "{other}" mit demselben Mesh im Edit-Modus: ihn erst verlassen (Tab)'
+    ),
+    'The mesh of "{name}" is a library override, of which Blender would not save the segments: make it local first '
+    "(Object > Relations > Make Local)": (
+        'Das Mesh von "{name}" ist ein Library Override, von dem Blender die Segmente nicht speichern würde: es erst '
+        "lokal machen (Objekt > Beziehungen > Lokal machen)"
+    ),
+    '{count} faces of "{mesh}" keep {materials}: which material they had before is not known': (
+        '{count} Flächen von "{mesh}" behalten {materials}: welches Material sie vorher hatten, ist nicht bekannt'
+    ),
+    'The image "{name}" has been changed since it was baked, and stays': (
+        'Das Bild "{name}" wurde seit dem Backen geändert und bleibt'
+    ),
+    "You have changed these materials, they stay in the file: {names}": (
+        "Diese Materialien haben Sie geändert, sie bleiben in der Datei: {names}"
+    ),
     '"{name}" is in tweak mode: leave it first (Tab in the Nonlinear Animation editor)': '"{name}" ist im Tweak-Modus: ihn erst verlassen (Tab im Editor Nonlinear Animation)',
     "{names} no longer exists": "{names} gibt es nicht mehr",
     "{count} characters are selected ({names}): click the one whose poses are meant": "{count} Charaktere sind ausgewählt ({names}): den anklicken, dessen Posen gemeint sind",
