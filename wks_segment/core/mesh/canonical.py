@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from .triangle_mesh import FloatArray, IntArray, TriangleMesh
 
-TILT = Rotation.from_rotvec((0.6, 0.4, 0.8)).as_matrix()
+SLANT = Rotation.from_rotvec((0.6, 0.4, 0.8)).as_matrix()
 """Coordinates are along the principal axes, turned by this: so the vertices of grids and boxes lie at different places
 along each, and cells of cubes do not cut a body along its own axes, where the fast solver was three times less exact on
 a body with its limbs along them."""
@@ -51,7 +51,7 @@ class Frame:
 
     def directions(self, vectors: FloatArray) -> FloatArray:
         """(k, 3) components of vectors in the same coordinates."""
-        return np.asarray(vectors @ self.axes @ TILT)
+        return np.asarray(vectors @ self.axes @ SLANT)
 
 
 def spread(mesh: TriangleMesh) -> float:
