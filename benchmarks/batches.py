@@ -160,7 +160,7 @@ def cached(characters: list[Path], output: Path) -> None:
     from wks_segment.blender.scene.file_formats import open_files
     from wks_segment.blender.scene.poses import own_frames, read_frames
     from wks_segment.blender.workflow import pipeline
-    from wks_segment.blender.workflow.pipeline import Run
+    from wks_segment.blender.workflow.describing import Run
     from wks_segment.blender.workflow.report import Report
     from wks_segment.core import DiskCache, PoseSegmentation
 

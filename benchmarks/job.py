@@ -20,8 +20,9 @@ import bpy
 import wks_segment.blender
 from benchmarks import shapes
 from wks_segment.blender.scene.pose_sources import read_training_poses
-from wks_segment.blender.workflow import pipeline
-from wks_segment.blender.workflow.pipeline import LabelRequest, Run
+from wks_segment.blender.workflow import describing, pipeline
+from wks_segment.blender.workflow.describing import Run
+from wks_segment.blender.workflow.pipeline import LabelRequest
 from wks_segment.blender.workflow.report import Report
 from wks_segment.core.poses import describe
 
@@ -73,7 +74,7 @@ def run() -> dict[str, dict[str, float]]:
 
     model = settings.new_model()
     poses = timed("read", read_training_poses, bpy.context, settings, Report([]))
-    described = timed("connect, eigenpairs, signature", pipeline.describe, model, poses, job)
+    described = timed("connect, eigenpairs, signature", describing.describe, model, poses, job)
     timed("mixture", model.fit, described)
     request = timed("read meshes", LabelRequest.of, settings, [pose.character for pose in poses])
     labels = timed("label", pipeline.label, model, poses, described, request, job)

@@ -20,8 +20,8 @@ import wks_segment.blender
 from benchmarks.speed import table_row
 from wks_segment.blender.scene import file_formats
 from wks_segment.blender.scene.pose_sources import read_training_poses
-from wks_segment.blender.workflow import pipeline
-from wks_segment.blender.workflow.pipeline import Run
+from wks_segment.blender.workflow import describing
+from wks_segment.blender.workflow.describing import Run
 from wks_segment.blender.workflow.report import Report
 from wks_segment.core import PoseSegmentation
 from wks_segment.core.mesh.triangle_mesh import FloatArray, IntArray
@@ -60,7 +60,7 @@ def agreements(path: Path) -> list[float]:
     poses = read_training_poses(bpy.context, settings, Report([]))
     polygons, rest = [pose.polygon_of for pose in poses], poses[0].upright
     eight = settings.new_model()
-    described = pipeline.describe(eight, poses, Run(Report([])))
+    described = describing.describe(eight, poses, Run(Report([])))
     eight.fit(described, rest=rest)
     areas = np.bincount(polygons[0], poses[0].mesh.face_areas).astype(np.float64)
     shares = []

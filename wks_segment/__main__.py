@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 import traceback
@@ -11,27 +12,47 @@ def main() -> None:
     """Run the command line and end the process with its exit code."""
     try:
         import bpy  # noqa: F401
-    except ImportError:
-        sys.exit(
-            "wks_segment: this command needs Blender as a Python module (pip install bpy); or use Blender: "
-            "blender --command wks_segment"
-        )
-    from . import blender
-    from .blender.cli.main import run
 
-    blender.register()
-    try:
+        from . import blender
+        from .blender.cli.main import run
+
+        blender.register()
         code = run(sys.argv[1:])
-    except SystemExit as end:  # argparse
+        blender.unregister()
+    except SystemExit as end:  # argparse, after the help
         code = int(end.code or 0)
-    except BaseException:
-        traceback.print_exc()
-        code = 1
-    blender.unregister()
+    except BaseException as error:
+        code = _failed_to_start(error)
     sys.stdout.flush()
     sys.stderr.flush()
     # Some versions of bpy crash or hang at a normal exit.
     os._exit(code)
+
+
+def _failed_to_start(error: BaseException) -> int:
+    """Tell why the command line could not be started, as all commands tell their errors; the exit code."""
+    if isinstance(error, ImportError):
+        reason = _why_not_loaded(error)
+    else:
+        traceback.print_exc()
+        reason = f"unexpected error, please report it: {type(error).__name__}: {error}"
+    print(f"wks_segment: {reason}", file=sys.stderr)
+    if "--json" in sys.argv:
+        print(json.dumps({"error": reason}))
+    return 1
+
+
+def _why_not_loaded(error: ImportError) -> str:
+    """What is missing, a package of Python or a library of the system, and what to do."""
+    if not isinstance(error, ModuleNotFoundError):  # the package is there, but not what it needs
+        return f"a library is missing or does not fit: {error}: install it with the package manager of the system"
+    if error.name == "bpy":
+        return (
+            "this command needs Blender as a Python module (pip install bpy); or use Blender: "
+            "blender --command wks_segment"
+        )
+    package = str(error.name).partition(".")[0]
+    return f'the Python package "{package}" is missing in {sys.executable}: pip install wks-segment'
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from shapes import creature, icosphere, split_at_every_corner, together
 
-from wks_segment.core import PoseSegmentation, TriangleMesh, prepare_surface
+from wks_segment.core import MemoryCache, PoseSegmentation, TriangleMesh, connect, prepare_surface
 from wks_segment.core.mesh.adjacency import FaceAdjacency, connected_regions
 
 SMALL = {"n_segments": 4, "n_eigenpairs": 60}
@@ -172,6 +172,23 @@ def test_progress_rises_to_one():
     assert {"mixture", "regions"} <= {stage for stage, _ in seen}
 
 
+def test_progress_has_a_share_for_what_is_computed_only():
+    """Signatures that are known take no time, and none of the bar."""
+
+    def first_of(stage, poses, cache=None):
+        seen = []
+        PoseSegmentation(**SMALL).fit(poses, lambda *report: seen.append(report), cache=cache)
+        return next(share for name, share in seen if name == stage)
+
+    cache, model = MemoryCache(), PoseSegmentation(**SMALL)
+    some = COARSE[::2]  # the most symmetric pose and the most spread one, so that another one changes no signature
+    all_new = first_of("parts", some, cache)
+    assert 0.5 < all_new < 0.9
+    assert first_of("parts", some, cache) == 0
+    assert 0.2 < first_of("parts", COARSE, cache) < all_new - 0.1
+    assert first_of("parts", [model.describe(pose) for pose in COARSE[:2]]) == 0
+
+
 class StopError(Exception):
     pass
 
@@ -249,8 +266,9 @@ def test_poses_described_in_parallel_equal_poses_described_one_by_one():
     model = PoseSegmentation(**SMALL)
     stages = []
     together_ = model.describe_all(POSES, progress=lambda stage, share: stages.append((stage, share)), workers=2)
+    connection = connect(*POSES)
     for pose, described in zip(POSES, together_, strict=True):
-        np.testing.assert_allclose(described.signature, model.describe(pose).signature, rtol=1e-4)
+        np.testing.assert_allclose(described.signature, model.describe(pose, connection).signature, rtol=1e-4)
     shares = [share for _, share in stages]
     assert shares == sorted(shares)
     assert shares[-1] == 1.0

@@ -47,6 +47,11 @@ WRONG = {
     "covariance_type: unknown": lambda: fit_mixture(SAMPLES, np.ones(12), 2, "round", 0),
     "components: too many": lambda: fit_mixture(SAMPLES, np.ones(12), 5, "diag"),
     "pose: none": lambda: model().fit([]),
+    "meshes: one mesh": lambda: model().fit(MESH),
+    "meshes: one described pose": lambda: model().fit(model().describe(MESH)),
+    "meshes: a number": lambda: model().describe_all(3),
+    "models: one model": lambda: rank(model(), []),
+    "poses: one mesh": lambda: rank([model()], MESH),
     "pose: a list": lambda: model().fit([[1, 2, 3]]),
     "n_segments: 0": lambda: model(n_segments=0).fit([MESH]),
     "n_segments: more than vertices": lambda: model(n_segments=999, preset="paper").fit([MESH]),
@@ -74,8 +79,29 @@ def test_the_argument_is_named(case):
         "segment": lambda model, mesh: model.with_segments(3),
         "eigenpairs": lambda model, mesh: model.predict(PoseSegmentation(2, n_eigenpairs=9).describe(mesh)),
         "polygons": lambda model, mesh: model.segment_polygons([mesh], []),
+        "poses": lambda model, mesh: model.segment_polygons(mesh, [np.arange(mesh.n_faces)]),
     }.items(),
 )
 def test_so_it_is_with_a_fitted_model(fitted, case, call):
-    with pytest.raises(ValueError, match=case):
+    with pytest.raises((ValueError, TypeError), match=case):
         call(fitted, creature(subdivisions=2))
+
+
+def test_a_generator_is_as_good_as_a_list(fitted):
+    mesh = creature(subdivisions=2)
+    again = model(preset="paper").fit(pose for pose in [mesh])
+    assert again.to_json() == fitted.to_json()
+    assert len(model().describe_all(pose for pose in [mesh])) == 1
+
+
+def test_results_do_not_depend_on_what_numpy_raises():
+    """Other code of the process may have called `numpy.seterr`."""
+    mesh, far = creature(subdivisions=2), icosphere(2)
+    usual = model().fit([mesh])
+    with np.errstate(all="raise"):
+        raising = model().fit([mesh])
+        labels = raising.segment_faces(far)
+        best = rank([raising, usual], [[raising.describe(far)], [usual.describe(far)]]).best.index
+    assert raising.to_json() == usual.to_json()
+    assert np.array_equal(labels, usual.segment_faces(far))
+    assert best == 0

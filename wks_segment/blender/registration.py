@@ -42,6 +42,7 @@ from .props.settings import WKSSegmentSettings
 from .ui import main_panel, menu, models_panel, segments_panel
 from .ui.preview import ViewportPreview
 from .ui.translations import TRANSLATIONS
+from .ui.viewport_colors import VIEWPORT_COLORS, ViewportColors
 from .workflow.background_job import JOB_HOLDER, JobHolder
 from .workflow.live_session import SESSION, Session
 from .workflow.property_changes import PropertyChanges
@@ -109,6 +110,7 @@ def register() -> None:
     bpy.types.Scene.wks_segment = bpy.props.PointerProperty(type=WKSSegmentSettings)
     setattr(bpy.types.WindowManager, JOB_HOLDER, JobHolder())
     setattr(bpy.types.WindowManager, SESSION, Session(ViewportPreview()))
+    setattr(bpy.types.WindowManager, VIEWPORT_COLORS, ViewportColors())
     bpy.app.translations.register(__name__, TRANSLATIONS)
     bpy.types.VIEW3D_MT_object.append(menu.draw_in_object_menu)
     _commands.append(bpy.utils.register_cli_command(COMMAND_NAME, run))
@@ -119,7 +121,7 @@ def unregister() -> None:
     bpy.utils.unregister_cli_command(_commands.pop())
     bpy.types.VIEW3D_MT_object.remove(menu.draw_in_object_menu)
     bpy.app.translations.unregister(__name__)
-    for name in (SESSION, JOB_HOLDER):
+    for name in (VIEWPORT_COLORS, SESSION, JOB_HOLDER):
         getattr(bpy.types.WindowManager, name).close()
         delattr(bpy.types.WindowManager, name)
     del bpy.types.Scene.wks_segment

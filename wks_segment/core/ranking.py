@@ -8,7 +8,7 @@ learned poses when these are left out. The usual scores also tell when a shape f
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -16,8 +16,10 @@ import numpy as np
 
 from .mesh.triangle_mesh import FloatArray, IntArray
 from .message import Message
+from .poses.arguments import as_list
 from .poses.pose_signature import PoseSignature
 from .segmentation import PoseSegmentation
+from .threads import one_blas_thread
 
 Verdict = Literal["sure", "unsure", "nothing fits"]
 SCORE_WIDTH = 0.1
@@ -109,7 +111,8 @@ def described_alike(models: Sequence[PoseSegmentation]) -> list[list[int]]:
     return list(groups.values())
 
 
-def rank(models: Sequence[PoseSegmentation], poses: Sequence[Sequence[PoseSignature]]) -> Ranking:
+@one_blas_thread
+def rank(models: Iterable[PoseSegmentation], poses: Iterable[Iterable[PoseSignature]]) -> Ranking:
     """Rank models by how well they fit a shape.
 
         ranking = rank(models, [[model.describe(mesh)] for model in models])
@@ -129,12 +132,13 @@ def rank(models: Sequence[PoseSegmentation], poses: Sequence[Sequence[PoseSignat
     ValueError
         If there is no model or no pose, or a signature was made with other settings than those of the model.
     """
-    if not models or len(models) != len(poses) or not all(len(described) for described in poses):
+    models, poses = as_list(models, "models"), [as_list(described, "poses") for described in as_list(poses, "poses")]
+    if not models or len(models) != len(poses) or not all(poses):
         raise ValueError(
             Message(
                 "there are {models} models, and poses for {described} of them",
                 models=len(models),
-                described=sum(map(bool, map(len, poses))),
+                described=sum(map(bool, poses)),
             )
         )
     scores = np.array([

@@ -6,7 +6,7 @@ descriptor" (2011).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from copy import copy
 from dataclasses import replace
 from os import PathLike
@@ -26,6 +26,7 @@ from .learning.training_samples import TrainingSamples
 from .mesh.surface import IslandMode
 from .mesh.triangle_mesh import FloatArray, TriangleMesh
 from .message import Message
+from .poses.arguments import as_list
 from .poses.pose_cache import AnyPose, Workpiece
 from .poses.signature_cache import Cache
 from .progress import Progress, ReportFunction
@@ -35,9 +36,11 @@ from .spectral.laplacian import unit_area_masses
 from .threads import one_blas_thread, one_thread
 from .user_labels import PartNotes
 
-DESCRIBED, GROUPED = 0.2, 0.8
-"""Shares of the time of a fit after which the poses are described, and the parts are found and merged."""
-
+GROUPED, RECOGNIZED = 0.63, 0.9
+"""Shares of the time of learning from described poses after which the parts are found and merged, and their regions
+are known: means of ten characters."""
+FIRST_ROUND = 0.7
+"""Share of the time that is left for regions after which a round of finding them ends; mostly there is one."""
 
 MERGING_ROUNDS = 6
 """Most times that regions are found, each time without a segment that was found nowhere."""
@@ -142,7 +145,7 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
     @one_thread  # k-means included: the same digits with any number of threads
     def fit(
         self,
-        meshes: Sequence[AnyPose],
+        meshes: Iterable[AnyPose],
         progress: ReportFunction | Progress | None = None,
         rest: TriangleMesh | None = None,
         cache: Cache | None = None,
@@ -174,16 +177,20 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
             If the eigenpairs of a pose could not be computed; see `describe`.
         """
         self._check_parameters()
-        if not len(meshes):
+        meshes = as_list(meshes, "meshes")
+        if not meshes:
             raise ValueError("there is no pose to learn from: pass at least one mesh, better three to five")
         overall, parameters = Progress.of(progress), self._parameters()
-        poses = self._all_described(meshes, overall.part(0.0, DESCRIBED), cache)
-        overall(DESCRIBED, "parts")
+        poses, described = self._all_described(meshes, overall, cache)
+        overall = overall.part(described, 1.0)
+        overall(0.0, "parts")
         training = TrainingSamples.of(poses, parameters)
-        learned = learn_parts(parameters, poses, training, rest, cache, overall.part(DESCRIBED, GROUPED))
+        learned = learn_parts(parameters, poses, training, rest, cache, overall.part(0.0, GROUPED))
         atlases = None
         if learned.grouping is not None:
-            learned, atlases = self._recognized(learned, training.standardizer, poses, rest, overall.part(GROUPED, 1.0))
+            learned, atlases = self._recognized(
+                learned, training.standardizer, poses, rest, overall.part(GROUPED, RECOGNIZED)
+            )
         self._set_learned(learned, training.standardizer, atlases, usual_scores(learned.mixture, training))
         self.part_notes_ = PartNotes()
         overall(1.0, "done")
@@ -214,7 +221,7 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
     def with_segments(
         self,
         n_segments: NSegments,
-        poses: Sequence[AnyPose] = (),
+        poses: Iterable[AnyPose] = (),
         rest: TriangleMesh | None = None,
     ) -> PoseSegmentation:
         """A copy of the model with another number of segments, at once: its components merged into as many groups.
@@ -253,7 +260,8 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
         model = copy(self)
         model.n_segments = n_segments
         model._check_parameters()
-        if len(poses):
+        poses = as_list(poses, "poses")
+        if poses:
             known = [atlas for atlas in (self.regions_, self.sides_) if atlas is not None]
             described = [model._described(pose) for pose in poses]
             model.regions_, model.sides_ = model._labeler().atlases(described, rest, Progress(), known)
@@ -342,8 +350,8 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
         assert learned.grouping is not None
         for round_ in range(MERGING_ROUNDS):
             labeler = self._labeler_of(learned.mixture, standardizer, learned.grouping, learned.traits)
-            step = progress.part(round_ / MERGING_ROUNDS, (round_ + 1) / MERGING_ROUNDS, "regions")
-            atlases = labeler.atlases(poses, rest, step)
+            atlases = labeler.atlases(poses, rest, progress.part(0.0, FIRST_ROUND, "regions"))
+            progress = progress.part(FIRST_ROUND, 1.0)
             lost = sorted(set(range(labeler.n_segments)) - set(atlases[1].traits.segment.tolist()))
             if not lost or learned.traits is not None or round_ == MERGING_ROUNDS - 1:
                 break  # the tree that is returned is the one that the atlases are of

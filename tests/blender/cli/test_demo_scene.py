@@ -9,7 +9,7 @@ from wks_segment.blender.cli.demo_scene import Demo, agreements, polygon_areas, 
 from wks_segment.blender.errors import UserError
 from wks_segment.blender.scene import poses as reader
 from wks_segment.blender.scene.poses import Character
-from wks_segment.blender.workflow.pipeline import Run
+from wks_segment.blender.workflow.describing import Run
 from wks_segment.blender.workflow.report import Report
 from wks_segment.core.progress import Progress
 

@@ -46,6 +46,20 @@ def test_linked_object(tmp_path):
     refuses(OPS.learn, '"Foreign" is linked from another file')
 
 
+def test_clear_where_the_segments_are_in_another_file(learned, tmp_path):
+    path = tmp_path / "library.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+    with bpy.data.libraries.load(str(path), link=True) as (_, target):
+        target.objects = [learned[0].name]
+    linked = target.objects[0]
+    bpy.context.scene.collection.objects.link(linked)
+    select(linked)
+    refuses(OPS.clear, "nothing to clear.*in another file")
+    select(linked, learned[0])
+    assert OPS.clear() == {"FINISHED"}
+    assert "wks_segment" not in learned[0].data.attributes
+
+
 def test_several_characters_for_frames(settings):
     settings.source = "FRAMES"
     select(*limbed_poses(0, 0.5))

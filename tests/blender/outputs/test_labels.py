@@ -216,7 +216,11 @@ def test_writing_without_colors_and_materials_removes_earlier_ones(painted):
     write_labels(painted, stripes(painted), OutputOptions(materials=True))
     write_labels(painted, stripes(painted), OutputOptions(colors=False))
     after = snapshot(painted)
-    assert set(after["attributes"]) - set(before["attributes"]) == {"wks_segment", "wks_segment_vertex"}
+    assert set(after["attributes"]) - set(before["attributes"]) == {
+        "wks_segment",
+        "wks_segment_vertex",
+        ".wks_segment_written",
+    }
     assert after["slots"] == before["slots"]
     assert after["material index"] == before["material index"]
 

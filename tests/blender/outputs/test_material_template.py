@@ -7,7 +7,7 @@ from builders import (
     labels_of,
 )
 
-from wks_segment.blender.outputs.materials import PART_PROPERTY
+from wks_segment.blender.outputs.part_materials import PART_PROPERTY
 from wks_segment.blender.parts.part_style import Style
 
 pytestmark = pytest.mark.usefixtures("scene")

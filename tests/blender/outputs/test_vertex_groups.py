@@ -17,8 +17,8 @@ from wks_segment.blender.outputs.labels import write_labels
 from wks_segment.blender.outputs.vertex_weights import LEAST_WEIGHT
 from wks_segment.blender.scene import poses as reader
 from wks_segment.blender.scene.characters import Character
-from wks_segment.blender.workflow import pipeline
-from wks_segment.blender.workflow.pipeline import Run
+from wks_segment.blender.workflow import describing, pipeline
+from wks_segment.blender.workflow.describing import Run
 from wks_segment.blender.workflow.report import Report
 
 pytestmark = pytest.mark.usefixtures("scene")
@@ -67,7 +67,7 @@ def test_soft_weights_are_the_mean_over_the_poses(settings, rigged):
     character = Character((rigged,))
     frames = reader.own_frames(bpy.context.scene, character, 3)
     poses = reader.read_frames(bpy.context, character, frames)
-    described = pipeline.describe(model, poses, Run(Report([])))
+    described = describing.describe(model, poses, Run(Report([])))
     each = [model.predict_soft(of_pose) for of_pose in described]
     components = [int(name.split()[-1]) - 1 for name in ours(rigged)]
 
@@ -91,7 +91,7 @@ def test_smoothness_smooths_the_soft_weights(settings):
         steps.append(np.abs(weights[edges[:, 0]] - weights[edges[:, 1]]).sum())
         if smoothness == 0:
             pose, model = read(obj), pipeline.stored_model(settings)
-            (signature,) = pipeline.describe(model, [pose], Run(Report([])))
+            (signature,) = describing.describe(model, [pose], Run(Report([])))
             plain = model.predict_proba(signature)
             np.testing.assert_allclose(weights[plain >= 0.99], plain[plain >= 0.99], atol=0.011)
             np.testing.assert_array_equal(weights > 0, plain >= LEAST_WEIGHT)

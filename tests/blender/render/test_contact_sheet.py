@@ -1,4 +1,6 @@
-"""Contact sheets: colors of parts, arrangement, and removal of temporary data."""
+"""Contact sheets: colors of parts, arrangement, scale, captions, and removal of temporary data."""
+
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -11,6 +13,7 @@ from wks_segment.blender.parts.part_style import Style
 from wks_segment.blender.render.contact_sheet import TILE_PIXELS, Tile, render_poses
 from wks_segment.blender.scene import poses as reader
 from wks_segment.blender.scene.poses import Character
+from wks_segment.core import TriangleMesh
 
 pytestmark = pytest.mark.usefixtures("scene", "needs_rendering")
 PARTS = (0, 3, 7)
@@ -83,6 +86,35 @@ def test_poses_are_arranged_in_rows(tmp_path):
     assert image.shape == (2 * TILE_PIXELS, 2 * TILE_PIXELS, 3)
     assert share_of(PARTS[1], image[TILE_PIXELS:, :TILE_PIXELS]) > 0.01
     assert share_of(PARTS[1], image[TILE_PIXELS:, TILE_PIXELS:]) == 0
+
+
+def test_each_character_fills_its_tiles(tmp_path):
+    """All of its poses with one scale: a pose that is half as large is shown so."""
+    large, tiny, half = tiles(3)
+    as_large = replace(large, pose=replace(large.pose, mesh=scaled(large.pose.mesh, 1000)))
+    as_half = replace(half, pose=replace(half.pose, character=tiny.pose.character, mesh=scaled(tiny.pose.mesh, 0.5)))
+    path = tmp_path / "poses.png"
+    render_poses([as_large, tiny, as_half], path)
+    covered = [(hues(image)[1] > 0.25).any(axis=0).mean() for image in np.split(pixels(path), 3, axis=1)]
+    assert min(covered[:2]) > 0.6
+    assert covered[2] == pytest.approx(covered[1] / 2, rel=0.15)
+
+
+def scaled(mesh, factor):
+    return TriangleMesh(mesh.vertices * factor, mesh.faces)
+
+
+@pytest.mark.parametrize("name", ["W" * 200, "a name, frame 120 " * 4, "line\nbreak " * 9], ids=["W", "words", "lines"])
+def test_captions_do_not_overlap(tmp_path, name):
+    path = tmp_path / "poses.png"
+    render_poses([replace(tile, caption=name) for tile in tiles(3)], path)
+    image = pixels(path)
+    dark = image[int(0.92 * TILE_PIXELS) :].max(axis=-1) < 0.5
+    for i in range(3):
+        own = dark[:, i * TILE_PIXELS : (i + 1) * TILE_PIXELS].any(axis=0)
+        assert own.mean() > 0.3, "the caption is there"
+        assert not own[:5].any()
+        assert not own[-5:].any()
 
 
 def test_the_temporary_scene_is_removed(tmp_path):

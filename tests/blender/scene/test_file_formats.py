@@ -44,7 +44,8 @@ def test_off_is_read(tmp_path, text):
 @pytest.mark.parametrize(
     ("text", "match"),
     [
-        ("", "does not begin with"),
+        ("", "file is empty"),
+        ("solid cube\n", "does not begin with"),
         ("OFF BINARY\n", "does not begin with"),
         (PYRAMID.replace("3 3 4 0\n", ""), "ends before all"),
         (PYRAMID.replace("3 1 4 2", "3 1 9 2"), "line 12 "),

@@ -13,7 +13,7 @@ from wks_segment.blender.outputs.options import OutputOptions
 from wks_segment.blender.parts import part_ids
 from wks_segment.blender.parts.palette import sided_palette
 from wks_segment.blender.scene.characters import Character
-from wks_segment.blender.workflow.pipeline import Run
+from wks_segment.blender.workflow.describing import Run
 from wks_segment.blender.workflow.report import Report
 
 pytestmark = pytest.mark.usefixtures("scene")

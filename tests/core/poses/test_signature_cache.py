@@ -227,6 +227,32 @@ def write_often(folder, limit, seed):
     sys.exit(0 if found else 3)
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no umask")
+def test_files_can_be_read_by_whom_the_user_allows(tmp_path):
+    before = os.umask(0o027)
+    try:
+        PoseSegmentation(**SMALL).describe_all([POSE], cache=DiskCache(tmp_path))
+    finally:
+        os.umask(before)
+    assert [oct(path.stat().st_mode & 0o777) for path in tmp_path.iterdir()] == ["0o640"]
+
+
+def test_a_file_of_another_user_is_found(tmp_path, monkeypatch):
+    """It can be read; to mark it as used, or to remove it from a shared folder, is not allowed."""
+
+    def forbidden(*_):
+        raise PermissionError("Operation not permitted")
+
+    cache = Counting(DiskCache(tmp_path))
+    PoseSegmentation(**SMALL).describe_all([POSE], cache=cache)
+    (tmp_path / "abandoned.part").touch()
+    os.utime(tmp_path / "abandoned.part", (0, 0))
+    monkeypatch.setattr(os, "utime", forbidden)
+    monkeypatch.setattr("pathlib.Path.unlink", forbidden)
+    PoseSegmentation(**SMALL).describe_all([POSE, OTHER], cache=cache)
+    assert cache.hits == 1
+
+
 def test_several_processes_use_one_folder(tmp_path):
     limit = 4 * sum(array.nbytes for array in PoseSegmentation(**SMALL).describe(creature(0.1, 2)).arrays().values())
     context = multiprocessing.get_context("spawn")

@@ -19,10 +19,12 @@ from ..scene import file_formats
 from ..scene import poses as reader
 from ..scene.characters import Character
 from ..scene.poses import Pose
-from ..workflow import model_library, pipeline
-from ..workflow.pipeline import LabelRequest, Run
-from ..workflow.report import pose_warnings
+from ..workflow import describing, model_library, pipeline
+from ..workflow.describing import Run
+from ..workflow.pipeline import LabelRequest
+from ..workflow.report import pose_warnings, shape_warnings
 from .creature import FIRST_FRAME, LAST_FRAME, build_creature
+from .reading import warn_at_once
 from .results import rounded_seconds, save_model
 
 DEMO_SUFFIXES = {"scene": ".blend", "picture": ".png", "model": ".json"}
@@ -74,6 +76,7 @@ class Demo:
         with run.report.stage("read"):
             poses = reader.read_frames(context, self.character, frames)
         run.report.poses = poses
+        warn_at_once(run.report, *shape_warnings(poses), *pose_warnings(poses, len(poses)))
         model = settings.new_model()
         labels = self._labels(model, poses, is_learned, settings, run)
         areas = [polygon_areas(pose, len(labels[0])) for pose in poses]
@@ -99,7 +102,7 @@ class Demo:
             "notes": run.report.notes,
             "seconds": rounded_seconds(run.report),
             "agreement": round(float(np.mean(np.array(agreement)[~np.array(is_learned)])), 4),
-            "warnings": [*run.report.warnings, *pose_warnings(poses, len(poses))],
+            "warnings": run.report.warnings,
             "files": {kind: str(path) for kind, path in paths.items()},
         }
 
@@ -145,7 +148,7 @@ class Demo:
         pipeline.write_outputs(settings, together, request, run.report, weights, renumbered=True)
         written = run.report.n_segments, run.report.parts
 
-        described += pipeline.describe(
+        described += describing.describe(
             model, others, run.with_progress(run.progress.part(LEARNED_SHARE, LABELED_SHARE))
         )
         labeled = run.with_progress(run.progress.part(LABELED_SHARE, LABELED_SHARE))

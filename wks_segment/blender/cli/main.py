@@ -4,58 +4,141 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
+import traceback
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from ...batch import CHILD_COMMAND, Answer, serve
 from ...core.progress import Progress
 from ..errors import UserError
+from ..streams import flush_streams
 from .commands import apply, bake, batch, demo, rank, segment
 from .results import result_text
 from .terminal import only_result_on_stdout, terminal_progress
 
 COMMAND_MODULES = (segment, apply, rank, bake, batch, demo)
 """Modules that each add one or two commands, in the order of the help."""
+INTERRUPTED = 130
+"""Exit code after Ctrl+C, as shells have it."""
+
+
+class UsageError(Exception):
+    """Options that do not exist, or values that they do not take; the message says which.
+
+    Attributes
+    ----------
+    usage : str
+        How the command is called.
+    """
+
+    def __init__(self, message: str, usage: str) -> None:
+        super().__init__(message)
+        self.usage = usage
+
+
+class _Parser(argparse.ArgumentParser):
+    """Parser that raises wrong usage, so that it can be answered like every other error."""
+
+    def error(self, message: str) -> NoReturn:
+        raise UsageError(message, f"{self.format_usage()}{self.prog}")
 
 
 def run(arguments: list[str]) -> int:
     """Run one command; return its exit code.
+
+    With `--json`, one JSON object is printed on standard output however the command ends: the result, or the reason
+    under "error".
 
     Returns
     -------
     int
         0 if the command succeeded; 1 if it failed, with the reason on standard error; 2 for wrong usage.
     """
-    options = _parser().parse_args(arguments)
+    as_json = "--json" in arguments
+    try:
+        options = _parser().parse_args(arguments)
+    except UsageError as error:
+        code, result, _ = _wrong_usage(error)
+        if as_json:
+            print(json.dumps(result))
+        return code
     with only_result_on_stdout() as stdout:
-        try:
-            with terminal_progress() as progress:
-                result = options.run(options, progress)
-        except UserError as error:
-            print(f"wks_segment: {error}", file=sys.stderr)
-            if options.json:
-                print(json.dumps({"error": str(error)}), file=stdout)
-            return 1
-        print(json.dumps(result) if options.json else options.text(result), file=stdout)
-    return 1 if result.get("failed") else 0  # files of a batch that failed
+        code, result, text = _ended(options)
+        if as_json:
+            print(json.dumps(_strictly(result), default=str), file=stdout)
+        elif text:
+            print(text, file=stdout)
+    return code
+
+
+def _ended(options: argparse.Namespace) -> tuple[int, dict[str, Any], str]:
+    """Run a command; its exit code, its result or the reason why there is none, and the result as text."""
+    try:
+        with terminal_progress() as progress:
+            result = options.run(options, progress)
+        code = int(bool(result.get("failed")))  # files of a batch
+        return code, result, "" if options.json else options.text(result)
+    except UsageError as error:
+        return _wrong_usage(error)
+    except KeyboardInterrupt:
+        return _failure("interrupted", INTERRUPTED)
+    except BaseException as error:
+        reason = reason_of(error)
+        if reason is None:
+            traceback.print_exc()
+            reason = f"unexpected error, please report it: {type(error).__name__}: {error}"
+        return _failure(reason)
+
+
+def _wrong_usage(error: UsageError) -> tuple[int, dict[str, Any], str]:
+    print(f"{error.usage}: error: {error}", file=sys.stderr)
+    return 2, {"error": f"wrong usage: {error}"}, ""
+
+
+def _failure(reason: str, code: int = 1) -> tuple[int, dict[str, Any], str]:
+    flush_streams()  # so that the reason comes last
+    print(f"wks_segment: {reason}", file=sys.stderr)
+    return code, {"error": reason}, ""
+
+
+def reason_of(error: BaseException) -> str | None:
+    """What an error tells a user; None if it was not foreseen, so that only its traceback says where it is from."""
+    if isinstance(error, UserError):
+        return str(error)
+    if isinstance(error, OSError) and error.filename is not None and error.strerror:
+        return f"{error.filename}: {error.strerror}"
+    if isinstance(error, MemoryError):
+        return "there is not enough memory: take fewer poses or eigenpairs, or end other programs"
+    return None
+
+
+def _strictly(value: Any) -> Any:
+    """The value without numbers that JSON does not have: null for infinity and for what is not a number."""
+    if isinstance(value, dict):
+        return {key: _strictly(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_strictly(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def answer(arguments: list[str]) -> Answer:
     """Run one command of a batch in this process, without output on the terminal."""
     try:
         options = _parser().parse_args(arguments)
-        return Answer(options.run(options, Progress()))
-    except SystemExit:  # from argparse, which has printed the reason
-        return Answer(None, f"wrong usage: {' '.join(arguments)}")
-    except UserError as error:
-        return Answer(None, str(error))
+        return Answer(_strictly(options.run(options, Progress())))
+    except UsageError as error:
+        return Answer(None, f"wrong usage: {error}")
+    except Exception as error:
+        reason = reason_of(error)
+        if reason is None:
+            raise
+        return Answer(None, reason)
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="wks_segment", description="The same parts, labels and colors in every pose of a character."
-    )
+    parser = _Parser(prog="wks_segment", description="The same parts, labels and colors in every pose of a character.")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for module in COMMAND_MODULES:
         module.add(commands)

@@ -3,31 +3,32 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+import sys
 from pathlib import Path
 
 import bpy
 
-from ...core.message import Message
+from ...core.message import Message, message_of
 from ..errors import UserError
 from ..scene import file_formats
 from ..scene import poses as reader
-from ..scene.actions import assign_action
 from ..scene.animation import Choice, animated
-from ..scene.characters import Character, armature_of, evaluated_objects, group, mesh_objects, quoted
+from ..scene.characters import Character, group, quoted
+from ..scene.missing_files import missing_files
 from ..scene.pose_library import read_actions
 from ..scene.poses import Pose
 from ..scene.simulations import check_simulations
 from ..scene.touching import joined
 from ..workflow import model_library
 from ..workflow.model_ranking import NamedModel, models_in_files
-from ..workflow.report import Report
+from ..workflow.report import Report, shape_warnings
+from .file_characters import characters_in, set_action
 
 
 def read_poses(
     options: argparse.Namespace, report: Report, *, single: bool = True, writes: bool = True
 ) -> list[Pose]:  # fmt: skip
-    """Poses of the characters in all files of the options.
+    """Poses of the characters in all files of the options; warns of what is wrong with them before they are used.
 
     Parameters
     ----------
@@ -40,27 +41,69 @@ def read_poses(
         Whether something will be written to the meshes, which a simulation would not survive.
     """
     poses: list[Pose] = []
-    over_time = options.frames is not None or options.markers is not None
     with report.stage("read"):
-        for path, objects in zip(options.files, file_formats.open_files(options.files), strict=True):
-            characters = characters_in(path, objects, options.object, report)
-            if writes or over_time:
-                check_simulations(bpy.context.scene, characters, over_time)
-            set_action(characters, options.action)
-            if options.object and path.suffix.lower() != ".blend":
-                characters = group([obj for character in characters for obj in character.objects], together=True)
-            if over_time:
-                poses += _animated_poses(path, characters, options, report, single)
-                continue
-            if path.suffix.lower() != ".blend":
-                characters = group([obj for character in characters for obj in character.objects], together=True)
-            else:
-                characters, notes = joined(bpy.context, characters)
-                report.choices += notes
-            for character in characters:
-                poses += _poses_of(character, options)
+        opened = file_formats.open_files(options.files)
+        missing = missing_files()
+        try:
+            for path, objects in zip(options.files, opened, strict=True):
+                characters = characters_in(path, objects, options.object, report)
+                if writes or _over_time(options):
+                    check_simulations(bpy.context.scene, characters, _over_time(options))
+                set_action(characters, options.action)
+                poses += _poses_in(path, characters, options, report, single)
+        except UserError as error:
+            if not missing:
+                raise
+            template = "{reason}; files that it needs are missing: {names}"
+            raise UserError(template, reason=message_of(error), names=", ".join(missing)) from error
     report.poses = poses
+    if missing:
+        template = "Files that this one needs are missing, and what is in them is left out: {names}"
+        warn_at_once(report, Message(template, names=", ".join(missing)))
+    warn_at_once(report, *report.left_out, *shape_warnings(poses))
     return poses
+
+
+def warn_at_once(report: Report, *warnings: str) -> None:
+    """Add warnings to a report, and print them on standard error before a long computation."""
+    for warning in dict.fromkeys(warnings):
+        if warning not in report.warnings:
+            print(f"warning: {warning}", file=sys.stderr, flush=True)
+    report.warn(*warnings)
+
+
+def _over_time(options: argparse.Namespace) -> bool:
+    """Whether the options ask for poses at several times of an animation."""
+    return options.frames is not None or options.markers is not None
+
+
+def _poses_in(
+    path: Path, characters: list[Character], options: argparse.Namespace, report: Report, single: bool
+) -> list[Pose]:
+    """Poses of the characters in a file, of which objects are made one that belong together."""
+    whole = path.suffix.lower() != ".blend"
+    if options.object and whole:
+        characters = group([obj for character in characters for obj in character.objects], together=True)
+    if _over_time(options):
+        return _animated_poses(path, characters, options, report, single)
+    if whole:
+        characters = group([obj for character in characters for obj in character.objects], together=True)
+    else:
+        characters, notes = joined(bpy.context, characters)
+        report.choices += notes
+    if options.shape_keys is not None:
+        characters = _with_shape_keys(characters, report)
+    return [pose for character in characters for pose in _poses_of(character, options)]
+
+
+def _with_shape_keys(characters: list[Character], report: Report) -> list[Character]:
+    """The characters that have shape keys, or all if none has; warns of those that are left out."""
+    without = [character for character in characters if not reader.shape_key_names(character)]
+    if not without or len(without) == len(characters):
+        return characters
+    names = quoted(character.name for character in without)
+    warn_at_once(report, Message("{names} has no shape keys and is left out", names=names))
+    return [character for character in characters if character not in without]
 
 
 def _poses_of(character: Character, options: argparse.Namespace) -> list[Pose]:
@@ -92,7 +135,7 @@ def _animated_poses(
             pose
             for character in found.characters
             for pose in reader.read_frames(
-                context, character, frames_of(character), list(markers.values()) or None, report.warnings
+                context, character, frames_of(character), list(markers.values()) or None, report.left_out
             )
         ]
 
@@ -105,92 +148,6 @@ def choice_of(path: Path, options: argparse.Namespace, single: bool = True) -> C
         together=path.suffix.lower() != ".blend",
         actions=options.action is None and options.frames is not None,
     )
-
-
-def characters_in(
-    path: Path, objects: list[bpy.types.Object], names: Sequence[str] | None, report: Report
-) -> list[Character]:
-    """Characters of a file, in the scene that has them.
-
-    Parameters
-    ----------
-    path
-    objects
-        All objects of the file.
-    names : optional
-        Names of objects, if only these are used.
-    report : Report
-        Told of a scene that was opened, and of objects that are disabled.
-
-    Raises
-    ------
-    UserError
-        If there is no mesh, or no object of a name.
-    """
-    if path.suffix.lower() == ".blend" and set(objects) == set(bpy.context.scene.objects):
-        objects = _scene_with_meshes(path, names, report)
-    meshes = [obj for obj in mesh_objects(objects) if not names or obj.name in names]
-    missing = set(names or ()) - {obj.name for obj in meshes}
-    if missing:
-        raise UserError("{path}: there is no mesh object named {names}", path=path, names=", ".join(sorted(missing)))
-    if not meshes:
-        raise UserError("{path}: there is no mesh in this file", path=path)
-    evaluated = evaluated_objects(bpy.context.view_layer)
-    disabled = [obj.name for obj in meshes if obj not in evaluated]
-    if len(disabled) == len(meshes):
-        raise UserError(
-            "{path}: all mesh objects in it are disabled in viewports, or their collections are disabled or excluded: "
-            "{names}",
-            path=path, names=quoted(disabled),
-        )  # fmt: skip
-    if names and disabled:
-        raise UserError(
-            "{path}: {names} is disabled in viewports, or its collection is disabled or excluded",
-            path=path, names=quoted(disabled),
-        )  # fmt: skip
-    if disabled:
-        report.choices.append(Message("Left out, disabled in viewports: {names}", names=quoted(disabled)))
-    return group([obj for obj in meshes if obj in evaluated])
-
-
-def _scene_with_meshes(path: Path, names: Sequence[str] | None, report: Report) -> list[bpy.types.Object]:
-    """The objects of the open scene, or of the only other one with mesh objects (of these names), which is opened.
-
-    Raises
-    ------
-    UserError
-        If several other scenes have some.
-    """
-
-    def has_meshes(scene: bpy.types.Scene) -> bool:
-        return any(not names or obj.name in names for obj in mesh_objects(scene.objects))
-
-    scene = bpy.context.scene
-    others = [other for other in bpy.data.scenes if other != scene and has_meshes(other)]
-    if has_meshes(scene) or not others:
-        return list(scene.objects)
-    if len(others) > 1:
-        raise UserError(
-            '{path}: the open scene "{scene}" has no such mesh, but {others} have: save the file with the right one '
-            "open",
-            path=path, scene=scene.name, others=quoted(other.name for other in others),
-        )  # fmt: skip
-    bpy.context.window.scene = others[0]
-    bpy.context.view_layer.update()
-    report.choices.append(Message('Taken from the scene "{scene}"', scene=others[0].name))
-    return list(others[0].objects)
-
-
-def set_action(characters: Sequence[Character], name: str | None) -> None:
-    """Assign the action of a name, if one is given, to the armature of each object, or to the object without one."""
-    if name is None:
-        return
-    action = bpy.data.actions.get(name)
-    if action is None:
-        names = ", ".join(other.name for other in bpy.data.actions) or "none"
-        raise UserError('There is no action named "{name}"; the file has: {names}', name=name, names=names)
-    for owner in dict.fromkeys(armature_of(obj) or obj for character in characters for obj in character.objects):
-        assign_action(owner, action)
 
 
 def read_models(folder: Path, report: Report) -> list[NamedModel]:

@@ -17,9 +17,13 @@ from ..render.contact_sheet import Tile, render_poses
 from ..scene import file_formats
 from ..scene.poses import Pose
 from ..workflow import pipeline
-from ..workflow.pipeline import LabelRequest, Run
+from ..workflow.describing import Run
+from ..workflow.pipeline import LabelRequest
 from ..workflow.report import Report
 from .terminal import table
+
+LABELED, SOFTENED = 0.4, 0.6
+"""Shares of the time after which the poses are labeled, and soft weights are known; the rest draws a picture."""
 
 
 def check_outputs(options: argparse.Namespace) -> None:
@@ -45,15 +49,16 @@ def label_and_write(
 
     See `pipeline.write_outputs` for `renumbered`.
     """
-    run = run.with_progress(run.progress.part(1.0, 1.0))  # takes no time beside the signatures
     request = LabelRequest.of(settings, (pose.character for pose in poses))
-    labels = pipeline.label(model, poses, described, request, run)
+    parts = [run.with_progress(run.progress.part(*ends)) for ends in ((0.0, LABELED), (LABELED, SOFTENED))]
+    labels = pipeline.label(model, poses, described, request, parts[0])
     if options.output:
-        weights = pipeline.soften(model, poses, described, labels, request, run)
+        weights = pipeline.soften(model, poses, described, labels, request, parts[1])
         pipeline.write_outputs(settings, labels, request, run.report, weights, renumbered)
     elif renumbered:
         settings.keep_notes(PartNotes())
     if options.render:
+        run.progress(SOFTENED, "Picture")
         with run.report.stage("render"):
             merged_into = settings.notes().joined
             tiles = [Tile(pose, merge_parts(labels[pose.character], merged_into), pose.name) for pose in poses]

@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TextIO
 
-from ...core.progress import Progress
+from ...core.progress import Progress, ReportFunction
+from ..streams import flush_streams
 
 
 @contextmanager
 def terminal_progress() -> Iterator[Progress]:
-    """Progress on standard error: a bar if it is a terminal and rich is installed, otherwise a line for each report."""
+    """Progress on standard error: a bar if it is a terminal and rich is installed, otherwise a line for each stage."""
     try:
         from rich.console import Console
         from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
         from rich.progress import Progress as Bar
     except ImportError:  # inside Blender: rich is not worth a wheel in the extension
-        yield Progress(_print_line)
+        yield Progress(_line_for_each_stage())
         return
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield Progress(_print_line)
+        yield Progress(_line_for_each_stage())
         return
     columns = (TextColumn("{task.description:<44}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     with Bar(*columns, console=console) as bar:
@@ -37,9 +37,16 @@ def terminal_progress() -> Iterator[Progress]:
         bar.update(task, description="Done", completed=1.0)
 
 
-def _print_line(stage: str, fraction: float) -> None:
-    if stage:
-        print(f"{round(100 * fraction):3d} %  {stage}", file=sys.stderr, flush=True)
+def _line_for_each_stage() -> ReportFunction:
+    """Report that prints a line when a stage is reported for the first time, with the share that is done by then."""
+    printed = {""}
+
+    def show(stage: str, fraction: float) -> None:
+        if stage not in printed:
+            printed.add(stage)
+            print(f"{round(100 * fraction):3d} %  {stage}", file=sys.stderr, flush=True)
+
+    return show
 
 
 @contextmanager
@@ -52,9 +59,7 @@ def only_result_on_stdout() -> Iterator[TextIO]:
         with os.fdopen(os.dup(real), "w", encoding="utf-8") as result:
             yield result
     finally:
-        sys.stdout.flush()
-        # Text that Blender printed may still be in a buffer of the C library, and would follow the result.
-        ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None).fflush(None)
+        flush_streams()  # text of Blender that is still in a buffer would follow the result
         os.dup2(real, 1)
         os.close(real)
 

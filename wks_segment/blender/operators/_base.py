@@ -5,6 +5,7 @@ A job runs in a thread while the window stays responsive, or at once if a script
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from typing import ClassVar, Generic, Protocol, TypeVar
 
 import bpy
@@ -19,6 +20,7 @@ from ..scene.change_guard import ChangeGuard
 from ..scene.poses import Pose
 from ..ui.messages import in_panel
 from ..workflow import pipeline
+from ..workflow.all_or_nothing import all_or_nothing
 from ..workflow.background_job import BackgroundJob, job_holder, redraw_sidebars
 from ..workflow.live_session import session_of
 from ..workflow.segmentation_job import SegmentationJob
@@ -49,9 +51,15 @@ class BaseOperator:
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Called by Blender."""
         try:
-            return self.run(context)
+            with self.protection(context):
+                return self.run(context)
         except UserError as error:
             return self.refuse(error)
+
+    def protection(self, context: bpy.types.Context) -> AbstractContextManager[None]:
+        """What `run` is done in: an error leaves everything as it was before."""
+        # In Edit Mode it begins where that is left.
+        return nullcontext() if context.mode == "EDIT_MESH" else all_or_nothing(context)
 
     def run(self, context: bpy.types.Context) -> set[str]:
         """Do what the operator is for; may raise UserError."""
@@ -93,6 +101,10 @@ class JobOperator(BaseOperator, Generic[J]):
     asked = False
     """Whether the next call of `execute` is the answer to the question about a large job."""
 
+    def protection(self, context: bpy.types.Context) -> AbstractContextManager[None]:
+        """None: computing changes nothing, and what is written at its end is protected by itself."""
+        return nullcontext()
+
     def read(self, context: bpy.types.Context) -> J:
         """Read everything that the job needs; UserError if it cannot be used."""
         raise NotImplementedError
@@ -100,6 +112,12 @@ class JobOperator(BaseOperator, Generic[J]):
     def write_result(self, context: bpy.types.Context) -> set[str]:
         """Write the computed result and report it."""
         raise NotImplementedError
+
+    def write_all_or_nothing(self, context: bpy.types.Context) -> set[str]:
+        """Write and report the result; an error leaves everything as it was before."""
+        members = [member.resolve() for pose in self.job.poses for member in pose.character.members]
+        with all_or_nothing(context, [obj for obj in members if obj is not None]):
+            return self.write_result(context)
 
     def take(self, settings: WKSSegmentSettings) -> None:
         """Hand properties of the operator to the scene's settings."""
@@ -133,7 +151,7 @@ class JobOperator(BaseOperator, Generic[J]):
         self.job = self.adjust_last(context) or self.read_and_check(context)
         with _report.cursor_progress(context) as progress:
             self.job.compute(progress)
-        return self.write_result(context)
+        return self.write_all_or_nothing(context)
 
     def start(self, context: bpy.types.Context) -> set[str]:
         """Read, start the thread and listen to the window's events; UserError if the job cannot be read."""
@@ -167,7 +185,7 @@ class JobOperator(BaseOperator, Generic[J]):
         message = ""
         try:
             self.thread_job.result()
-            return self.write_result(context)
+            return self.write_all_or_nothing(context)
         except (ChangedError, EndedError) as error:
             self.thread_job.end(message_of(error))
             message = self.thread_job.end_message

@@ -10,10 +10,8 @@ import bpy
 from ...core.message import Message
 from ...core.progress import Progress
 from ..ui.messages import in_panel, in_report, in_tooltip
+from ..ui.viewport_colors import viewport_colors_of
 from ..workflow.report import Report
-
-LABEL_COLOR_TYPE = "VERTEX"
-"""Color of solid shading that shows the active color attribute."""
 
 
 def tell(operator: bpy.types.Operator, kind: set[str], text: str) -> None:
@@ -63,16 +61,12 @@ def tell_warnings(operator: bpy.types.Operator, warnings: list[str]) -> None:
 
 def show_colors(context: bpy.types.Context) -> None:
     """Let the 3D viewport that the user works in show the colors, if its shading is solid."""
-    space = context.space_data
-    if space is not None and space.type == "VIEW_3D" and space.shading.type == "SOLID":
-        space.shading.color_type = LABEL_COLOR_TYPE
+    viewport_colors_of(context).show(context.space_data)
 
 
 def hide_colors(context: bpy.types.Context) -> None:
-    """Let the 3D viewport that the user works in show materials again, if it shows the colors."""
-    space = context.space_data
-    if space is not None and space.type == "VIEW_3D" and space.shading.color_type == LABEL_COLOR_TYPE:
-        space.shading.color_type = "MATERIAL"
+    """Let the 3D viewport that the user works in show what it did before, if it shows the colors."""
+    viewport_colors_of(context).hide(context.space_data)
 
 
 def has_window(context: bpy.types.Context) -> bool:

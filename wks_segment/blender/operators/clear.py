@@ -5,10 +5,11 @@ from __future__ import annotations
 import bpy
 
 from ...core.message import Message
+from ..errors import UserError
 from ..outputs.labels import clear_labels
 from ..outputs.part_attributes import has_labels
 from ..outputs.separate import original_of, unite
-from ..scene.characters import selected_meshes
+from ..scene.characters import check_not_edited, quoted, selected_meshes
 from ..workflow import segment_list
 from . import _needs, _report
 from ._base import BaseOperator
@@ -25,16 +26,25 @@ class WKS_SEGMENT_OT_clear(BaseOperator, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         selected = selected_meshes(context)
-        names = {obj.name for obj in selected}
+        for obj in selected:
+            check_not_edited(obj)
+        linked = [obj.name for obj in selected if has_labels(obj.data) and obj.data.library is not None]
+        if linked and len(linked) == sum(has_labels(obj.data) for obj in selected):
+            raise UserError(
+                "There is nothing to clear: the segments of {names} are in another file: clear them there, or make it "
+                "local first (Object > Relations)",
+                names=quoted(linked),
+            )
+        names, warnings = {obj.name for obj in selected}, list[str]()
         originals = {original for obj in selected if (original := original_of(obj)) is not None}
-        n_kept = sum(unite(context, original) for original in originals)
-        # Separated objects are removed by now, unless the user has changed them.
+        n_kept = sum(len(unite(context, original)) for original in originals)
+        # Separated objects are out of the scene by now, unless the user has changed them.
         remaining = originals | {obj for obj in context.scene.objects if obj.name in names}
         meshes = {obj.data for obj in remaining if obj.data.library is None}
-        n_cleared = sum(clear_labels(mesh) for mesh in meshes)
+        n_cleared = sum(clear_labels(mesh, warnings) for mesh in meshes)
         context.scene.wks_segment.applied = ""
         segment_list.fill(context.scene.wks_segment)
-        if not any(has_labels(mesh) for mesh in bpy.data.meshes):
+        if not any(obj.type == "MESH" and has_labels(obj.data) for obj in context.scene.objects):
             _report.hide_colors(context)
         if n_cleared == 1:
             _report.tell(self, {"INFO"}, "Cleared the segments of 1 mesh")
@@ -44,4 +54,5 @@ class WKS_SEGMENT_OT_clear(BaseOperator, bpy.types.Operator):
             _report.tell(
                 self, {"WARNING"}, Message("{count} separated objects have changed since and are kept", count=n_kept)
             )
+        _report.tell_warnings(self, warnings)
         return {"FINISHED"}

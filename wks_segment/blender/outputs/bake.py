@@ -111,7 +111,7 @@ def bake_id_maps(
     for layer in layers:
         name = IMAGE_NAME.format(character.name if len(layers) == 1 else layer.objects[0].name)
         meshes = list(dict.fromkeys(obj.data for obj in layer.objects))
-        image = write_id_map(meshes, name, with_margin(layer.part_map, options.margin), options.style)
+        image = write_id_map(meshes, name, with_margin(layer.part_map, options.margin), options.style, warnings)
         maps.append(IdMap(image, tuple(layer.objects)))
     return maps
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from hashlib import blake2b
 from pathlib import Path
 
 import bpy
@@ -9,15 +10,21 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from ...core.mesh.triangle_mesh import IntArray
+from ...core.message import Message
 from ..errors import UserError
 from ..parts.part_style import Style
-from ..scene.attributes import write_pixels
+from ..scene.attributes import read_pixels, write_pixels
+from ..scene.fingerprint import fingerprint, users_of
 from .ledger import Ledger
+from .own_property import OwnProperty
+from .restore_point import on_failure, remove
 
 IMAGE_NAME = "{} ID Map"
 """Name of the image of a character or object."""
 IMAGE_PROPERTY = "wks_segment_id_map"
 """Custom property of our images."""
+_MADE = OwnProperty("wks_segment_id_map_made", "as")
+"""Custom property of our images: hash of the pixels, and fingerprint ("as") as this Blender ("by") made them."""
 NO_PART = -1
 """In a map of parts: no face covers the pixel."""
 
@@ -28,10 +35,10 @@ class IdMapImage:
     keys = ("id_map",)
 
     def take_back(self, mesh: bpy.types.Mesh, ledger: Ledger) -> None:
-        """Remove the image, unless another mesh is in it as well or the artist uses it."""
+        """Remove the image, unless another mesh is in it as well or the artist uses it or has painted on it."""
         name = ledger.get("id_map", "")
         ledger.remove("id_map")
-        _remove_unused(name)
+        ledger.warnings += _remove_unused(name)
 
 
 def with_margin(part_map: IntArray, margin: int) -> IntArray:
@@ -41,8 +48,12 @@ def with_margin(part_map: IntArray, margin: int) -> IntArray:
     return np.where(distance <= margin, part_map[tuple(nearest)], NO_PART)
 
 
-def write_id_map(meshes: list[bpy.types.Mesh], name: str, part_map: IntArray, style: Style) -> bpy.types.Image:
+def write_id_map(
+    meshes: list[bpy.types.Mesh], name: str, part_map: IntArray, style: Style, warnings: list[str]
+) -> bpy.types.Image:
     """Make an image of a (size, size) map of the meshes' parts, from the bottom row up, in place of their earlier one.
+
+    An earlier one that the artist has painted on stays; a warning says so.
 
     Each pixel has exactly the color of its part, in 8 bits, and is black where no part is. The image is data: color
     management does not change its numbers. It is kept in the .blend file.
@@ -51,10 +62,11 @@ def write_id_map(meshes: list[bpy.types.Mesh], name: str, part_map: IntArray, st
     ledgers = [Ledger(mesh) for mesh in meshes]
     old_names = [ledger.get("id_map", "") for ledger in ledgers]
     image = _our_image(old_names[0])
-    if image is None or _meshes_in(image) - set(meshes):
+    if image is None or _meshes_in(image) - set(meshes) or not _is_as_made(image):
         image = bpy.data.images.new(name, size, size, alpha=False, is_data=True)
         image[IMAGE_PROPERTY] = True
         image.use_fake_user = True  # nothing uses it yet, and Blender does not save what nothing uses
+    _keep_pixels(image)
     if tuple(image.size) != (size, size):
         image.scale(size, size)
     numbers, row = np.unique(part_map, return_inverse=True)
@@ -65,10 +77,11 @@ def write_id_map(meshes: list[bpy.types.Mesh], name: str, part_map: IntArray, st
     write_pixels(image, colors[row.reshape(part_map.shape)])
     image.update()
     image.pack()
+    _MADE.put(image, {"pixels": _hash_of(image), "as": _fingerprint_of(image), "by": bpy.app.version_string})
     for ledger in ledgers:
         ledger["id_map"] = image.name
-    for old_name in old_names:
-        _remove_unused(old_name)
+    for old_name in dict.fromkeys(old_names):
+        warnings += _remove_unused(old_name)
     return image
 
 
@@ -85,13 +98,58 @@ def save_image(image: bpy.types.Image, path: Path) -> None:
         raise UserError("{path}: cannot write the image", path=path)
 
 
-def _remove_unused(name: str) -> None:
-    """Remove the image of ours with this name, if no mesh is in it and the artist does not use it."""
+def _remove_unused(name: str) -> list[Message]:
+    """Remove the image of ours with this name, if no mesh is in it and the artist neither uses nor changed it.
+
+    Returns
+    -------
+    list of Message
+        That it was changed, and stays.
+    """
     image = _our_image(name)
     if image is None or _meshes_in(image):
-        return
-    if all(isinstance(user, bpy.types.Screen) for user in bpy.data.user_map(subset=[image])[image]):
-        bpy.data.images.remove(image)
+        return []
+    if not _is_as_made(image):
+        return [Message('The image "{name}" has been changed since it was baked, and stays', name=name)]
+    if not users_of(image)[image]:
+        remove(image)
+    return []
+
+
+def _is_as_made(image: bpy.types.Image) -> bool:
+    """Whether nobody has painted on an image of ours or changed its settings; older versions do not tell."""
+    made = _MADE.of(image)
+    if made is None:
+        return not image.is_dirty
+    if made["by"] != bpy.app.version_string:
+        return bool(made["pixels"] == _hash_of(image))
+    return bool(made["as"] == _fingerprint_of(image))
+
+
+def _fingerprint_of(image: bpy.types.Image) -> str:
+    # The resolution is rounded when the image is read from a file.
+    return fingerprint(image, ignored=("resolution",))
+
+
+def _hash_of(image: bpy.types.Image) -> str:
+    return blake2b(read_pixels(image).tobytes(), digest_size=16).hexdigest()
+
+
+def _keep_pixels(image: bpy.types.Image) -> None:
+    """Let an error bring the pixels of an image back."""
+    size, pixels, made = tuple(image.size), read_pixels(image), _MADE.of(image)
+    entries = None if made is None else made.to_dict()
+
+    def bring_back() -> None:
+        image.scale(*size)
+        write_pixels(image, pixels)
+        image.update()
+        image.pack()
+        if entries is not None:
+            _MADE.put(image, {**entries, "as": _fingerprint_of(image)})
+
+    if made is not None:
+        on_failure(bring_back)
 
 
 def _our_image(name: str) -> bpy.types.Image | None:

@@ -17,7 +17,7 @@ from ..scene.characters import Character
 from ..scene.vertex_group_access import group_weights
 from .face_sets import FACE_SET_ATTRIBUTE, FIRST_FACE_SET
 from .ledger import Ledger
-from .materials import PART_PROPERTY
+from .part_materials import part_of
 from .vertex_groups import our_groups, own_groups
 
 FACE_SETS, MATERIALS, VERTEX_GROUPS = "FACE_SETS", "MATERIALS", "VERTEX_GROUPS"
@@ -116,7 +116,7 @@ def _in_materials(obj: bpy.types.Object) -> _Membership:
     if not materials:
         raise UserError('"{name}" has no materials: assign some, or let segments write theirs', name=obj.name)
     slots = read_ints(obj.data.polygons, "material_index")
-    ours = {material: int(material[PART_PROPERTY]) for material in materials if material and PART_PROPERTY in material}
+    ours = {material: part for material in materials if (part := part_of(material)) is not None}
     # Blender shows the last material on faces with an index beyond the last slot.
     return _Membership(np.minimum(slots, len(materials) - 1), materials, ours)
 

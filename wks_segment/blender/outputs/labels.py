@@ -12,17 +12,21 @@ import bpy
 import numpy as np
 
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
+from ...core.message import Message
 from ..parts.part_style import Style
+from ..scene.characters import quoted
 from ..scene.vertex_group_access import active_group
 from .color_attribute import ColorAttribute
 from .face_sets import FaceSets
 from .id_map import IdMapImage
+from .joined_meshes import adopt
 from .ledger import Ledger
-from .materials import Materials, materials_kept, template_on
+from .materials import Materials, template_on
 from .options import DEFAULT_OUTPUTS, OutputOptions
 from .output import LastingOutput, Output, PartsOfMesh
 from .overrides import ByHand, ModelLabels, by_hand, merge_parts, model_labels
 from .part_attributes import PartAttributes, has_labels, labels_on
+from .part_materials import keep_unused
 from .seams import Seams
 from .uv_maps import UvMap
 from .vertex_groups import VertexGroups, read_groups
@@ -37,7 +41,7 @@ OUTPUTS: tuple[Output, ...] = (
     Seams(),
     ModelLabels(),
 )
-"""What is written with labels, in this order."""
+"""What is written with labels, in this order, and taken back in the reverse order: outputs need the labels."""
 NOTHING_MERGED: Mapping[int, int] = MappingProxyType({})
 LASTING_OUTPUTS: tuple[LastingOutput, ...] = (UvMap(), IdMapImage(), ByHand())
 
@@ -65,6 +69,7 @@ def write_labels(
     (p,) int array
         The parts as they were written.
     """
+    adopt(mesh)
     given = by_hand(mesh)
     final = merge_parts(np.where(given < 0, labels, given), merged_into)
     if weights is not None:
@@ -73,12 +78,13 @@ def write_labels(
         weights = hard_weights(mesh, final)
     shown = None if weights is None else active_group(mesh)
     ledger = Ledger(mesh)
-    for output in OUTPUTS:
+    for output in reversed(OUTPUTS):
         output.take_back(mesh, ledger)
     ledger.begin([key for lasting in LASTING_OUTPUTS for key in lasting.keys])
     parts = PartsOfMesh(final, labels, weights, shown, options)
     for output in OUTPUTS:
         output.write(mesh, parts, ledger)
+    keep_unused()
     mesh.update()
     return final
 
@@ -106,17 +112,30 @@ def rewrite_labels(mesh: bpy.types.Mesh, style: Style, merged_into: Mapping[int,
         seams="seams" in ledger,
         style=style,
     )
-    with materials_kept(mesh):
-        write_labels(mesh, labels, options, merged_into, weights)
+    write_labels(mesh, labels, options, merged_into, weights)
 
 
-def clear_labels(mesh: bpy.types.Mesh) -> bool:
-    """Remove exactly what is ours on a mesh and restore what was there; False if there was nothing."""
+def clear_labels(mesh: bpy.types.Mesh, warnings: list[str] | None = None) -> bool:
+    """Remove exactly what is ours on a mesh and restore what was there; False if there was nothing.
+
+    Parameters
+    ----------
+    warnings
+        Gets what was not taken back, and why.
+    """
     if not has_labels(mesh):
         return False
+    adopt(mesh)
     ledger = Ledger(mesh)
-    for output in (*OUTPUTS, *LASTING_OUTPUTS):
+    for output in reversed((*OUTPUTS, *LASTING_OUTPUTS)):
         output.take_back(mesh, ledger)
     ledger.delete()
     mesh.update()
+    changed = keep_unused()
+    if warnings is not None:
+        warnings += ledger.warnings
+        if changed:
+            warnings.append(
+                Message("You have changed these materials, they stay in the file: {names}", names=quoted(changed))
+            )
     return True

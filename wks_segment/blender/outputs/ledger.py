@@ -4,15 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from typing import Any
+from zlib import crc32
 
 import bpy
 from numpy.typing import NDArray
 
+from ...core.message import Message
 from ..scene.attributes import write_attribute
 from ..scene.vertex_group_access import free_name
+from .own_property import OwnProperty
 
 LEDGER = "wks_segment_note"
 """Name of the custom property. It and its keys never change, since files of older versions must be cleared as well."""
+MARK = "mark"
+"""Key of the number that tells faces which were written with this ledger from those of meshes that were joined."""
+_PROPERTY = OwnProperty(LEDGER, MARK, "faces")
 
 
 class Ledger:
@@ -23,7 +29,10 @@ class Ledger:
 
     def __init__(self, mesh: bpy.types.Mesh) -> None:
         self._mesh = mesh
-        self._entries: dict[str, Any] = mesh[LEDGER].to_dict() if has_ledger(mesh) else {}
+        found = _PROPERTY.of(mesh)
+        self._entries: dict[str, Any] = {} if found is None else found.to_dict()
+        self.warnings: list[Message] = []
+        """What the user should know of what was taken back. Not kept on the mesh."""
 
     def __contains__(self, key: str) -> bool:
         return key in self._entries
@@ -32,9 +41,9 @@ class Ledger:
         return self._entries[key]
 
     def __setitem__(self, key: str, value: Any) -> None:
-        if not has_ledger(self._mesh):
-            self._mesh[LEDGER] = {}
-        self._mesh[LEDGER][key] = value
+        if not self._entries:
+            self.begin(())
+        _PROPERTY.of(self._mesh)[key] = value
         self._entries[key] = value
 
     def get(self, key: str, default: Any) -> Any:
@@ -44,16 +53,17 @@ class Ledger:
     def remove(self, key: str) -> None:
         """Remove an entry, if it is there."""
         if key in self._entries:
-            del self._entries[key], self._mesh[LEDGER][key]
+            del self._entries[key], _PROPERTY.of(self._mesh)[key]
 
     def begin(self, kept: Iterable[str]) -> None:
         """Begin anew with only these entries of before."""
-        self._mesh[LEDGER] = {key: self._entries[key] for key in kept if key in self}
-        self._entries = self._mesh[LEDGER].to_dict()
+        self._entries = {key: self._entries[key] for key in kept if key in self}
+        self._entries[MARK] = _mark_of(self._mesh)
+        _PROPERTY.put(self._mesh, self._entries)
 
     def delete(self) -> None:
         """Remove the ledger from the mesh."""
-        del self._mesh[LEDGER]
+        _PROPERTY.delete(self._mesh)
         self._entries = {}
 
     def add_attribute(self, key: str, name: str, data_type: str, domain: str, values: NDArray[Any]) -> None:
@@ -75,4 +85,9 @@ class Ledger:
 
 def has_ledger(mesh: bpy.types.Mesh) -> bool:
     """Whether a mesh carries a ledger of ours, rather than none or somebody else's property of that name."""
-    return LEDGER in mesh and hasattr(mesh[LEDGER], "to_dict")
+    return _PROPERTY.of(mesh) is not None
+
+
+def _mark_of(mesh: bpy.types.Mesh) -> int:
+    """A number above 0 that is another for each mesh of a file."""
+    return crc32(mesh.name.encode()) >> 1 | 1

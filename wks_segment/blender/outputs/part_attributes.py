@@ -1,4 +1,4 @@
-"""The numbers of parts as integer attributes of faces and vertices."""
+"""The numbers of parts as integer attributes of faces and vertices, and which faces were written to."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import bpy
 import numpy as np
 
 from ...core.mesh.triangle_mesh import IntArray
-from ..scene.attributes import read_face_ints, read_ints
+from ..scene.attributes import OUR_HIDDEN_ATTRIBUTE, read_face_ints, read_ints
 from ..scene.topology import at_corners
-from .ledger import Ledger, has_ledger
+from .ledger import MARK, Ledger, has_ledger
 from .output import PartsOfMesh
 
 FACE_ATTRIBUTE = "wks_segment"
@@ -16,22 +16,25 @@ VERTEX_ATTRIBUTE = "wks_segment_vertex"
 
 
 class PartAttributes:
-    """Two attributes: the part of each face, and the part of most faces around each vertex."""
+    """The part of each face, the part of most faces around each vertex, and a hidden mark on the faces written to."""
 
     def write(self, mesh: bpy.types.Mesh, parts: PartsOfMesh, ledger: Ledger) -> None:
-        """Add both attributes."""
+        """Add the attributes."""
         ledger.add_attribute("faces", FACE_ATTRIBUTE, "INT", "FACE", parts.of_polygons)
         ledger.add_attribute("vertices", VERTEX_ATTRIBUTE, "INT", "POINT", _labels_of_vertices(mesh, parts.of_polygons))
+        mark = np.full(len(mesh.polygons), ledger[MARK])
+        ledger.add_attribute("written", OUR_HIDDEN_ATTRIBUTE, "INT", "FACE", mark)
 
     def take_back(self, mesh: bpy.types.Mesh, ledger: Ledger) -> None:
-        """Remove both attributes."""
+        """Remove the attributes."""
         ledger.remove_attribute("faces")
         ledger.remove_attribute("vertices")
+        ledger.remove_attribute("written")
 
 
 def has_labels(mesh: bpy.types.Mesh) -> bool:
     """Whether a mesh carries anything that we wrote."""
-    return has_ledger(mesh)
+    return has_ledger(mesh) or OUR_HIDDEN_ATTRIBUTE in mesh.attributes
 
 
 def labels_on(mesh: bpy.types.Mesh) -> IntArray | None:

@@ -36,7 +36,7 @@ class Seams:
         own = own_seams(mesh)
         write_bools(mesh.edges, "use_seam", own)
         attribute = _seam_attribute(mesh)
-        if not ledger["had_seams"] and attribute is not None and not own.any():
+        if not ledger.get("had_seams", True) and attribute is not None and not own.any():
             mesh.attributes.remove(attribute)
         ledger.remove_attribute("seams")
 

@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from zlib import crc32
 
 import bmesh
 import bpy
 import numpy as np
 from mathutils import Matrix
-from numpy.typing import NDArray
 
 from ...core.mesh.triangle_mesh import BoolArray, IntArray
 from ..parts import part_ids
 from ..parts.part_style import Style
-from ..scene.attributes import read_floats, read_ints
-from ..scene.vertex_group_access import group_weights
+from ..scene.fingerprint import fingerprint, label_of, users_of
 from .ledger import Ledger
+from .own_property import OwnProperty
+from .part_attributes import labels_on
+from .part_materials import without_number
+from .restore_point import on_failure, remove
 
-SEPARATED_PROPERTY = "wks_segment_piece"
-"""Custom property of a separated object: the original object ("of") and a checksum of the object as made ("as")."""
-ORIGINAL_PROPERTY = "wks_segment_whole"
+_SEPARATED = OwnProperty("wks_segment_piece", "as")
+"""Custom property of a separated object: the original ("of"), and a fingerprint ("as") of the object as this version of
+Blender ("by") made it."""
+_ORIGINAL = OwnProperty("wks_segment_whole", "eye")
 """Custom property of the original object: whether it was hidden before."""
 
 
@@ -32,20 +36,10 @@ def separate(
     A separated object has the parent of the original, or else the original as its parent, and has its collections,
     modifiers, materials, vertex groups, shape keys and UV maps.
     """
-    separated = []
-    for part in part_ids.unique_parts(labels):
-        mesh = _with_polygons(obj.data, labels == part)
-        mesh.name = style.name_of(part)
-        copy = obj.copy()
-        copy.name, copy.data = style.name_of(part), mesh
-        if obj.parent is None:
-            _parent_to(copy, obj)
-        for collection in obj.users_collection:
-            collection.objects.link(copy)
-        separated.append(copy)
-    for copy in separated:
-        copy[SEPARATED_PROPERTY] = {"of": obj, "as": _checksum(copy)}
-    obj[ORIGINAL_PROPERTY] = {"eye": obj.hide_get(), "render": obj.hide_render}
+    separated = [_make(obj, labels, part, style) for part in part_ids.unique_parts(labels)]
+    _enter(obj, separated)
+    on_failure(lambda: _ORIGINAL.delete(obj))
+    _ORIGINAL.put(obj, {"eye": obj.hide_get(), "render": obj.hide_render})
     for copy in separated:
         copy.select_set(True)
     obj.select_set(False)
@@ -57,35 +51,116 @@ def separate(
 
 def original_of(obj: bpy.types.Object) -> bpy.types.Object | None:
     """The object that an object was separated from; the object itself if others were separated from it; else None."""
-    if ORIGINAL_PROPERTY in obj:
+    if _ORIGINAL.of(obj) is not None:
         return obj
-    is_ours = SEPARATED_PROPERTY in obj and hasattr(obj[SEPARATED_PROPERTY], "to_dict")
-    return obj[SEPARATED_PROPERTY].get("of") if is_ours else None
+    made = _SEPARATED.of(obj)
+    original = None if made is None else made.get("of")
+    return original if isinstance(original, bpy.types.Object) else None
 
 
-def unite(context: bpy.types.Context, original: bpy.types.Object) -> int:
+def unite(context: bpy.types.Context, original: bpy.types.Object) -> list[bpy.types.Object]:
     """Remove the objects that were separated from an object, and show it again.
 
-    Objects that an artist has changed since stay; gives their number.
+    Objects that an artist has changed since stay, and are given back. So does all that uses them or their meshes.
     """
-    n_kept = 0
-    for obj in [obj for obj in bpy.data.objects if obj is not original and original_of(obj) is original]:
-        if obj[SEPARATED_PROPERTY]["as"] != _checksum(obj):
-            del obj[SEPARATED_PROPERTY]
-            n_kept += 1
-        else:
+    changed = []
+    for obj in separated_from(original):
+        if is_as_made(obj):
             mesh = obj.data
-            bpy.data.objects.remove(obj)
-            bpy.data.meshes.remove(mesh)
-    hidden = original[ORIGINAL_PROPERTY].to_dict()
-    del original[ORIGINAL_PROPERTY]
-    original.hide_render = hidden["render"]
-    if original.name in context.view_layer.objects:
-        original.hide_set(hidden["eye"])
+            remove(obj)
+            remove(mesh)
+        else:
+            changed.append(obj)
+    for obj in changed:
+        _let_go(_SEPARATED, obj)
+    hidden = _ORIGINAL.of(original)
+    if hidden is not None:
+        eye, render = hidden["eye"], hidden["render"]
+        _let_go(_ORIGINAL, original)
+        original.hide_render = render
+        if original.name in context.view_layer.objects:
+            original.hide_set(eye)
     if original.visible_get(view_layer=context.view_layer):
         original.select_set(True)
         context.view_layer.objects.active = original
-    return n_kept
+    return changed
+
+
+def separated_from(original: bpy.types.Object) -> list[bpy.types.Object]:
+    """The objects that were separated from an object."""
+    return [obj for obj in bpy.data.objects if obj is not original and original_of(obj) is original]
+
+
+def is_as_made(obj: bpy.types.Object) -> bool:
+    """Whether a separated object, its mesh, and what uses them, are as they were made."""
+    made = _SEPARATED.of(obj)
+    if made.get("by") == bpy.app.version_string:
+        return bool(made["as"] == _state(obj))
+    # Another version has other properties: then it must be as it would be made again.
+    labels, original = labels_on(obj.data), made["of"]
+    of_original = labels_on(original.data)
+    if labels is None or of_original is None or len(np.unique(labels)) != 1 or labels[0] not in of_original:
+        return False
+    again = _make(original, of_original, int(labels[0]), Style())
+    again.hide_render = _ORIGINAL.of(original)["render"] if _ORIGINAL.of(original) is not None else again.hide_render
+    try:
+        names = {scene.wks_segment.style().name_of(int(labels[0])) for scene in bpy.data.scenes}
+        is_named = without_number(obj.name) in names and without_number(obj.data.name) in names
+        return (
+            is_named and _users(obj) == _users(again) and fingerprint(obj, obj.data) == fingerprint(again, again.data)
+        )
+    finally:
+        mesh = again.data
+        bpy.data.objects.remove(again)
+        bpy.data.meshes.remove(mesh)
+
+
+@contextmanager
+def followed(objects: Iterable[bpy.types.Object]) -> Iterator[None]:
+    """Let separated objects among some objects stay as made by us while we write to them."""
+    separated = {obj: original for obj in objects if (original := original_of(obj)) not in (None, obj)}
+    ours = [obj for obj in separated if is_as_made(obj)]
+    yield
+    for obj in ours:
+        _enter(separated[obj], [obj])
+
+
+def _make(obj: bpy.types.Object, labels: IntArray, part: int, style: Style) -> bpy.types.Object:
+    """Make the object of a part."""
+    mesh = _with_polygons(obj.data, labels == part)
+    mesh.name = style.name_of(part)
+    copy = obj.copy()
+    copy.name, copy.data = style.name_of(part), mesh
+    if obj.parent is None:
+        _parent_to(copy, obj)
+    for collection in obj.users_collection:
+        collection.objects.link(copy)
+    return copy
+
+
+def _enter(original: bpy.types.Object, separated: list[bpy.types.Object]) -> None:
+    """Keep how separated objects are made."""
+    for obj in separated:
+        _SEPARATED.put(obj, {"of": original, "as": _state(obj), "by": bpy.app.version_string})
+
+
+def _let_go(own: OwnProperty, obj: bpy.types.Object) -> None:
+    entries = own.of(obj).to_dict()
+    on_failure(lambda: own.put(obj, entries))
+    own.delete(obj)
+
+
+def _state(obj: bpy.types.Object) -> str:
+    """A hash of all that an artist may change of an object, and of its users."""
+    users = users_of(obj, obj.data)
+    names = [label_of(block) for block in (obj, obj.data, *users[obj], *users[obj.data])]
+    return f"{crc32(chr(10).join(names).encode()):08x}{fingerprint(obj, obj.data)}"
+
+
+def _users(obj: bpy.types.Object) -> list[list[str]]:
+    """Types and names, without numbers, of what uses an object and its mesh, apart from the object itself."""
+    users = users_of(obj, obj.data)
+    return [sorted(without_number(label_of(user)) for user in users[block] if user != obj) for block in users]
 
 
 def _with_polygons(mesh: bpy.types.Mesh, kept: BoolArray) -> bpy.types.Mesh:
@@ -115,24 +190,3 @@ def _parent_to(copy: bpy.types.Object, obj: bpy.types.Object) -> None:
     copy.delta_location, copy.delta_rotation_euler, copy.delta_scale = (0, 0, 0), (0, 0, 0), (1, 1, 1)
     copy.delta_rotation_quaternion = (1, 0, 0, 0)
     copy.matrix_basis = Matrix()
-
-
-def _checksum(obj: bpy.types.Object) -> str:
-    """A number that changes with what an artist may change of an object: names, place, shape, UVs, colors, weights."""
-    mesh = obj.data
-    texts = [obj.name, *(slot.name for slot in obj.material_slots), *(modifier.name for modifier in obj.modifiers)]
-    if obj.animation_data is None:
-        texts += [f"{value:.9g}" for row in obj.matrix_basis for value in row]
-    shapes = [block.data for block in mesh.shape_keys.key_blocks] if mesh.shape_keys else [mesh.vertices]
-    arrays: list[NDArray[Any]] = [
-        np.frombuffer("\n".join(texts).encode(), dtype=np.uint8),
-        read_ints(mesh.loops, "vertex_index").astype(np.int32),
-        *(read_floats(shape, "co", 3) for shape in shapes),
-        *(read_floats(layer.data, "uv", 2) for layer in mesh.uv_layers),
-        *(read_floats(layer.data, "color", 4) for layer in mesh.color_attributes),
-        *group_weights(mesh).values(),
-    ]
-    checksum = 0
-    for array in arrays:
-        checksum = crc32(array.tobytes(), checksum)
-    return f"{checksum:08x}"

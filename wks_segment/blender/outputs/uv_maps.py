@@ -26,7 +26,7 @@ class UvMap:
         if layer is None:
             return
         active = mesh.uv_layers.active.name
-        active = ledger["active_uv"] if active == layer.name else active
+        active = ledger.get("active_uv", "") if active == layer.name else active
         rendered = next((other.name for other in mesh.uv_layers if other.active_render), "")
         mesh.uv_layers.remove(layer)
         for other in mesh.uv_layers:

@@ -7,6 +7,8 @@ the live session and the list of models, which are defined above the properties.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, Protocol
 
 
@@ -45,3 +47,33 @@ def remove_listener() -> None:
 def listener() -> PropertyListener:
     """The connected listener; the extension connects one before it registers the properties."""
     return _connected[0]
+
+
+@contextmanager
+def unheard() -> Iterator[None]:
+    """Tell nobody about changes in the block: values are set again that the listener knows already."""
+    before = list(_connected)
+    _connected[:] = [_Deaf()]
+    try:
+        yield
+    finally:
+        _connected[:] = before
+
+
+class _Deaf:
+    """A listener that does nothing."""
+
+    def labels_outdated(self, settings: Any) -> None:
+        """Nothing."""
+
+    def model_chosen(self, settings: Any) -> None:
+        """Nothing."""
+
+    def model_renamed(self, settings: Any, row: Any) -> None:
+        """Nothing."""
+
+    def rename_part(self, settings: Any, part: int, name: str) -> None:
+        """Nothing."""
+
+    def recolor_part(self, settings: Any, part: int, color: tuple[float, float, float]) -> None:
+        """Nothing."""

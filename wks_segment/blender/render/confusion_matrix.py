@@ -10,12 +10,12 @@ import numpy as np
 from mathutils import Matrix
 
 from ...core import Retrieval
-from .contact_sheet import add_text, paint, picture_scene, render
+from .contact_sheet import add_text, paint, picture_scene, render, width_of
 
 CELL_PIXELS = 72
 """Width and height of a cell, in pixels."""
-TEXT_HEIGHT, LETTER_WIDTH = 0.36, 0.17
-"""Height of text and approximate width of a letter, in cells."""
+TEXT_HEIGHT, CELL_TEXT_WIDTH, NAME_WIDTH, LINE_WIDTH = 0.36, 0.85, 6.0, 30.0
+"""Height of text, and the largest widths of a number, of a name and of a line below the matrix, in cells."""
 MATRIX_MARGIN = 0.4
 """Width of the margin around the matrix, in cells."""
 RIGHT_COLOR, WRONG_COLOR, EMPTY_COLOR = (0.13, 0.42, 0.70), (0.80, 0.22, 0.16), (0.95, 0.95, 0.96)
@@ -27,22 +27,27 @@ def render_matrix(retrieval: Retrieval, path: Path) -> None:
     names, counts = retrieval.names, retrieval.confusion
     summary = f"{retrieval.right} of {retrieval.asked} right ({retrieval.rate:.1%})"
     legend = "row: class, column: class that it is taken for"
-    label = LETTER_WIDTH * max(map(len, names)) + 0.2
-    width = max(label + len(names), LETTER_WIDTH * max(len(summary), len(legend))) + 2 * MATRIX_MARGIN
-    height = label + len(names) + 4 * TEXT_HEIGHT + 2 * MATRIX_MARGIN
     with picture_scene() as scene:
+        widths = [0.0]
         for i, name in enumerate(names):
-            _text(scene, name, -0.2, -i - 0.5 - TEXT_HEIGHT / 3, "RIGHT")
-            _text(scene, name, i + 0.5 + TEXT_HEIGHT / 3, 0.2, "LEFT", vertical=True)
+            row = _text(scene, name, (-0.2, -i - 0.5 - TEXT_HEIGHT / 3), "RIGHT", NAME_WIDTH)
+            _text(scene, name, (i + 0.5 + TEXT_HEIGHT / 3, 0.2), "LEFT", NAME_WIDTH, vertical=True)
+            widths.append(width_of(row.data))
             for j, count in enumerate(counts[i]):
                 share = count / max(counts[i].sum(), 1)
                 full_color = RIGHT_COLOR if i == j else WRONG_COLOR
                 color = tuple(np.array(EMPTY_COLOR) + share**0.5 * (np.array(full_color) - EMPTY_COLOR))
                 _cell(scene, j, -i, color)
                 if count:
-                    _text(scene, str(count), j + 0.5, -i - 0.5 - TEXT_HEIGHT / 3, "CENTER", light=share > 0.4)
-        for i, line in enumerate((summary, legend)):
-            _text(scene, line, -label, -len(names) - (1.6 + 1.5 * i) * TEXT_HEIGHT, "LEFT")
+                    place = j + 0.5, -i - 0.5 - TEXT_HEIGHT / 3
+                    _text(scene, str(count), place, "CENTER", CELL_TEXT_WIDTH, light=share > 0.4)
+        label = max(widths) + 0.4
+        lines = [
+            _text(scene, line, (-label, -len(names) - (1.6 + 1.5 * i) * TEXT_HEIGHT), "LEFT", LINE_WIDTH)
+            for i, line in enumerate((summary, legend))
+        ]
+        width = max(label + len(names), *(width_of(line.data) for line in lines)) + 2 * MATRIX_MARGIN
+        height = label + len(names) + 4 * TEXT_HEIGHT + 2 * MATRIX_MARGIN
         camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
         camera.data.type = "ORTHO"
         camera.data.ortho_scale = max(width, height)
@@ -56,12 +61,14 @@ def render_matrix(retrieval: Retrieval, path: Path) -> None:
 
 
 def _text(
-    scene: bpy.types.Scene, text: str, x: float, y: float, align: str, vertical: bool = False, light: bool = False
-) -> None:
-    """Add text at (x, y), from left to right or, if vertical, upwards."""
-    letters = add_text(scene, text, TEXT_HEIGHT, align, (1.0, 1.0, 1.0) if light else (0.05, 0.05, 0.05))
-    letters.location = (x, y, 1.0)
+    scene: bpy.types.Scene, text: str, place: tuple[float, float], align: str, width: float,
+    vertical: bool = False, light: bool = False,
+) -> bpy.types.Object:  # fmt: skip
+    """Add text at a place, from left to right or, if vertical, upwards."""
+    letters = add_text(scene, text, TEXT_HEIGHT, width, align, (1.0, 1.0, 1.0) if light else (0.05, 0.05, 0.05))
+    letters.location = (*place, 1.0)
     letters.rotation_euler.z = pi / 2 if vertical else 0.0
+    return letters
 
 
 def _cell(scene: bpy.types.Scene, x: float, y: float, color: tuple[float, ...]) -> None:

@@ -17,8 +17,10 @@ from mathutils import Matrix, Vector
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ..errors import UserError
 from ..parts.part_style import PLAIN, Style
-from ..scene.attributes import write_attribute
+from ..scene.attributes import read_floats, write_attribute
+from ..scene.characters import Character
 from ..scene.poses import Pose
+from ..streams import silent
 
 TILE_PIXELS = 480
 """Width and height of the tile of a pose, in pixels."""
@@ -26,9 +28,11 @@ TILES_IN_ROW = 4
 VIEW_DIRECTION = Vector((-0.85, -1.0, 0.45))
 """Direction from the poses to the camera: front left and slightly above, for a character that faces −Y."""
 TILE_SCALE = 1.16
-"""Width and height of a tile, relative to the largest pose; leaves room for the caption."""
-CAPTION_SIZE = 0.05
-"""Height of captions, in tiles."""
+"""Width and height of a tile, relative to the largest pose of its character; leaves room for the caption."""
+CAPTION_SIZE, CAPTION_WIDTH = 0.05, 0.94
+"""Height of captions and their largest width, in tiles."""
+LEAST_SHRUNK = 0.6
+"""Size of text, relative to its usual one, below which it is cut short instead: smaller letters cannot be read."""
 BACKGROUND = (0.82, 0.82, 0.84)
 """Linear RGB of the background."""
 CAPTION_COLOR = (0.05, 0.05, 0.05)
@@ -50,6 +54,8 @@ class Tile:
 def render_poses(tiles: Sequence[Tile], path: Path, columns: int = TILES_IN_ROW, style: Style = PLAIN) -> None:
     """Render poses to one PNG file, with `columns` tiles in a row, in the colors of a style.
 
+    All poses of a character have one scale, and each character fills its tiles.
+
     The temporary scene that is used for it is removed.
 
     Raises
@@ -64,13 +70,16 @@ def render_poses(tiles: Sequence[Tile], path: Path, columns: int = TILES_IN_ROW,
     up = toward.cross(right)
     axes = np.array([right, up, toward])
     placed = [tile.pose.mesh.vertices @ axes.T for tile in tiles]
-    tile_size = TILE_SCALE * max(float(np.ptp(points[:, :2], axis=0).max()) for points in placed)
+    sizes: dict[Character, float] = {}
+    for tile, points in zip(tiles, placed, strict=True):
+        size = TILE_SCALE * float(np.ptp(points[:, :2], axis=0).max())
+        sizes[tile.pose.character] = max(size, sizes.get(tile.pose.character, 0.0))
     with picture_scene() as scene:
         for i, (tile, points) in enumerate(zip(tiles, placed, strict=True)):
             middle = (points.min(axis=0) + points.max(axis=0)) / 2
-            place = np.array([i % columns, -(i // columns), 0.0]) * tile_size
-            _add_pose(scene, (points - middle + place) / tile_size, tile, style)
-            _add_caption(scene, tile.caption, place / tile_size)
+            place = np.array([i % columns, -(i // columns), 0.0])
+            _add_pose(scene, (points - middle) / sizes[tile.pose.character] + place, tile, style)
+            _add_caption(scene, tile.caption, place)
         _add_camera(scene, columns, rows)
         render(scene, path, TILE_PIXELS * columns, TILE_PIXELS * rows)
 
@@ -108,27 +117,51 @@ def _triangle_colors(tile: Tile, style: Style) -> FloatArray:
 
 
 def _add_caption(scene: bpy.types.Scene, text: str, place: FloatArray) -> None:
-    letters = add_text(scene, text, CAPTION_SIZE)
+    letters = add_text(scene, text, CAPTION_SIZE, CAPTION_WIDTH)
     letters.location = (place[0], place[1] - 0.5 + CAPTION_SIZE / 2, 0.0)
 
 
 def add_text(
-    scene: bpy.types.Scene, text: str, size: float, align: str = "CENTER", color: tuple[float, ...] = CAPTION_COLOR
-) -> bpy.types.Object:
-    """Add text as a mesh, with its base line through the origin."""
+    scene: bpy.types.Scene, text: str, size: float, width: float, align: str = "CENTER",
+    color: tuple[float, ...] = CAPTION_COLOR,
+) -> bpy.types.Object:  # fmt: skip
+    """Add text as a mesh, with its base line through the origin.
+
+    Text that is wider than allowed is made smaller, and loses its middle if it would be too small to be read: names of
+    poses often differ at the end.
+    """
+    text = " ".join(text.split())
+    mesh = _letters(text, size, align)
+    share = width / max(width_of(mesh), 1e-6)
+    if share < LEAST_SHRUNK:
+        kept = max(int(len(text) * share / LEAST_SHRUNK) - 1, 2)
+        bpy.data.meshes.remove(mesh)
+        mesh = _letters(f"{text[: kept - kept // 2]}…{text[len(text) - kept // 2 :]}", size, align)
+        share = width / max(width_of(mesh), 1e-6)
+    mesh.transform(Matrix.Scale(min(share, 1.0), 4))
+    paint(mesh, np.tile(color, (len(mesh.loops), 1)))
+    caption = bpy.data.objects.new("caption", mesh)
+    scene.collection.objects.link(caption)
+    return caption
+
+
+def width_of(mesh: bpy.types.Mesh) -> float:
+    """Extent of a mesh along x."""
+    x = read_floats(mesh.vertices, "co", 3)[:, 0]
+    return float(np.ptp(x)) if len(x) else 0.0
+
+
+def _letters(text: str, size: float, align: str) -> bpy.types.Mesh:
+    """A mesh of the letters of a text: only a mesh can have a color attribute."""
     curve = bpy.data.curves.new("caption", "FONT")
     curve.body = text
     curve.size = size
     curve.align_x = align
     letters = bpy.data.objects.new("caption", curve)
-    # Only a mesh can have a color attribute.
     mesh = bpy.data.meshes.new_from_object(letters)
     bpy.data.objects.remove(letters)
     bpy.data.curves.remove(curve)
-    paint(mesh, np.tile(color, (len(mesh.loops), 1)))
-    caption = bpy.data.objects.new("caption", mesh)
-    scene.collection.objects.link(caption)
-    return caption
+    return mesh
 
 
 def paint(mesh: bpy.types.Mesh, srgb: FloatArray) -> None:
@@ -164,7 +197,8 @@ def render(scene: bpy.types.Scene, path: Path, width: int, height: int, light: s
     shading.light, shading.color_type = light, "VERTEX"
     shading.show_cavity = light == "STUDIO"
     try:
-        bpy.ops.render.render(write_still=True, scene=scene.name)
+        with silent(unless_it_fails=True):
+            bpy.ops.render.render(write_still=True, scene=scene.name)
     except RuntimeError as error:
         raise UserError("{path}: the picture could not be rendered: {reason}", path=path, reason=error) from error
     try:

@@ -39,6 +39,8 @@ _ATTRIBUTE_TYPES = {
     "FLOAT_COLOR": _AttributeType("color_srgb", 4, np.float32),
 }
 """By the name of the type in Blender. Colors are read and written as sRGB."""
+OUR_HIDDEN_ATTRIBUTE = ".wks_segment_written"
+"""Face attribute of ours that lists do not show: not 0 on faces that were written to."""
 
 
 def read_floats(elements: Elements, prop: str, width: int = 1) -> Float32Array:
@@ -56,6 +58,24 @@ def read_bools(elements: Elements, prop: str) -> BoolArray:
     return _read(elements, prop, 1, np.bool_)
 
 
+def read_numbers(elements: Elements, prop: bpy.types.Property) -> NDArray[Any] | None:
+    """(n * width,) values of any property of n elements that are numbers; None if Blender does not give them at once.
+
+    Parameters
+    ----------
+    prop
+        The property as `bl_rna` of an element describes it.
+    """
+    dtype = {"BOOLEAN": np.bool_, "INT": np.int32, "FLOAT": np.float32}[prop.type]
+    width = prop.array_length if prop.is_array else 1
+    values = np.empty(len(elements) * width, dtype=dtype)
+    try:
+        elements.foreach_get(prop.identifier, values)
+    except (AttributeError, RuntimeError, TypeError):
+        return None
+    return values
+
+
 def write_floats(elements: Elements, prop: str, values: NDArray[Any]) -> None:
     """Set a property of n elements to (n,) or (n, width) values."""
     _write(elements, prop, values, np.float32)
@@ -69,6 +89,12 @@ def write_ints(elements: Elements, prop: str, values: NDArray[Any]) -> None:
 def write_bools(elements: Elements, prop: str, values: NDArray[Any]) -> None:
     """Set a property of n elements to (n,) values."""
     _write(elements, prop, values, np.bool_)
+
+
+def is_readable(attribute: bpy.types.Attribute) -> bool:
+    """Whether `read_attribute` can read it: some of Blender's own, whose names start with a dot, have a wrong type."""
+    hidden = attribute.name.startswith(".") and attribute.name not in (".sculpt_face_set", OUR_HIDDEN_ATTRIBUTE)
+    return attribute.data_type in _ATTRIBUTE_TYPES and not hidden
 
 
 def read_attribute(mesh: bpy.types.Mesh, name: str) -> NDArray[Any] | None:

@@ -50,7 +50,8 @@ class ChangeGuard:
 
 def _mesh_state(obj: bpy.types.Object) -> tuple[str, int, int]:
     """Mode and numbers of vertices and polygons of an object, which are cheap to read."""
-    return obj.mode, len(obj.data.vertices), len(obj.data.polygons)
+    # A mesh can be in Edit Mode through another object.
+    return "EDIT" if obj.data.is_editmode else obj.mode, len(obj.data.vertices), len(obj.data.polygons)
 
 
 def _check_member(member: Member, obj: bpy.types.Object | None, state: tuple[str, int, int]) -> None:

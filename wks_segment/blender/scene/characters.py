@@ -210,7 +210,7 @@ def group(objects: Sequence[bpy.types.Object], together: bool = False) -> list[C
     Raises
     ------
     UserError
-        If there is no object, or one is linked from another file or is in Edit Mode.
+        If there is no object, or one is linked from another file, is an override of one, or is in Edit Mode.
     """
     if not objects:
         raise UserError("No mesh object to work on: select the character's mesh")
@@ -219,14 +219,32 @@ def group(objects: Sequence[bpy.types.Object], together: bool = False) -> list[C
             raise UserError(
                 '"{name}" is linked from another file: make it local first (Object > Relations)', name=obj.name
             )
-        if obj.mode == "EDIT":
-            raise UserError('"{name}" is in Edit Mode: leave it first (Tab)', name=obj.name)
+        if obj.data.override_library is not None:
+            raise UserError(
+                'The mesh of "{name}" is a library override, of which Blender would not save the segments: make it '
+                "local first (Object > Relations > Make Local)",
+                name=obj.name,
+            )
+        check_not_edited(obj)
     if together:
         return [Character(tuple(objects))]
     by_body: dict[bpy.types.Object, list[bpy.types.Object]] = {}
     for obj in objects:
         by_body.setdefault(_body_of(obj, set(objects)), []).append(obj)
     return [Character(tuple(members)) for members in by_body.values()]
+
+
+def check_not_edited(obj: bpy.types.Object) -> None:
+    """UserError if an object is in Edit Mode, or another one with its mesh: Blender cannot write to the mesh then."""
+    if obj.mode == "EDIT":
+        raise UserError('"{name}" is in Edit Mode: leave it first (Tab)', name=obj.name)
+    if obj.data.is_editmode:
+        others = (other.name for other in bpy.data.objects if other.data == obj.data and other.mode == "EDIT")
+        raise UserError(
+            '"{name}" is in Edit Mode through "{other}", which has the same mesh: leave it first (Tab)',
+            name=obj.name,
+            other=next(others, obj.data.name),
+        )
 
 
 def _body_of(obj: bpy.types.Object, among: set[bpy.types.Object]) -> bpy.types.Object:

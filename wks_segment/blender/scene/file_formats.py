@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 import bpy
 
+from ...core.message import Message
 from ..errors import UserError
+from ..streams import silent
+from .file_content import check_content
 from .off_files import import_off
 
 
@@ -43,6 +48,10 @@ IMPORTERS: dict[str, Callable[[str], object]] = {
     ".usda": lambda path: bpy.ops.wm.usd_import(filepath=path),
     ".usdz": lambda path: bpy.ops.wm.usd_import(filepath=path),
 }
+TRACEBACK = "Traceback (most recent call last):"
+READ_NAME, WRITTEN_NAME, PATH_BYTES = 255, 230, 1000
+"""Most bytes of the name of a file that is read, of one that is written, and of a whole path. File systems take 255
+bytes and Blender 1023, and a name gets a suffix while its file is written."""
 EXPORTERS: dict[str, Callable[[str], object]] = {
     ".blend": lambda path: bpy.ops.wm.save_as_mainfile(filepath=path, copy=True),
     ".glb": lambda path: bpy.ops.export_scene.gltf(filepath=path, export_vertex_color="ACTIVE"),
@@ -61,6 +70,7 @@ def open_files(paths: list[Path]) -> list[list[bpy.types.Object]]:
         If a file does not exist, is of no known format, or cannot be read.
     """
     for path in paths:
+        check_length(path, READ_NAME)
         if not path.is_file():
             raise UserError("{path}: there is no such file", path=path)
         if path.suffix.lower() not in IMPORTERS:
@@ -69,6 +79,7 @@ def open_files(paths: list[Path]) -> list[list[bpy.types.Object]]:
                 "opens it. Known are {formats}",
                 path=path, formats=", ".join(IMPORTERS),
             )  # fmt: skip
+        check_content(path)
     if len(paths) == 1 and paths[0].suffix.lower() == ".blend":
         _try(lambda path: bpy.ops.wm.open_mainfile(filepath=path, load_ui=False), paths[0])
         if bpy.context.object is not None and bpy.context.object.mode != "OBJECT":
@@ -83,14 +94,46 @@ def _import(path: Path) -> list[bpy.types.Object]:
     before = set(bpy.data.objects)
     _try(IMPORTERS[path.suffix.lower()], path)
     bpy.context.view_layer.update()
-    return [obj for obj in bpy.data.objects if obj not in before]
+    objects = [obj for obj in bpy.data.objects if obj not in before]
+    if not objects:  # some importers only print what is wrong
+        raise UserError(
+            "{path}: there is no mesh in this file: Blender's importer found nothing in it, so it is empty or damaged",
+            path=path,
+        )
+    return objects
 
 
 def _try(reader: Callable[[str], object], path: Path) -> None:
     try:
-        reader(str(path.resolve()))
+        with silent():
+            reader(str(path.resolve()))
     except (RuntimeError, OSError) as error:
-        raise UserError("{path}: Blender cannot read it: {reason}", path=path, reason=str(error).strip()) from error
+        raise UserError("{path}: Blender cannot read it: {reason}", path=path, reason=_reason(str(error))) from error
+    except AttributeError as error:
+        if "could not be found" not in str(error):
+            raise
+        raise UserError(
+            "{path}: Blender's importer of {suffix} files is turned off or missing in this Blender: enable its add-on",
+            path=path, suffix=path.suffix.lower(),
+        ) from error  # fmt: skip
+
+
+def _reason(text: str) -> Message:
+    """The error of an operator in one line, without what Blender puts before it.
+
+    An importer that is written in Python fails with the whole traceback, of which the last line says what is wrong.
+    """
+    if TRACEBACK not in text:
+        lines = (line.strip().removeprefix("Error: ") for line in text.splitlines())
+        return Message("{text}", text="; ".join(line.rstrip(".") for line in lines if line))
+    raised = re.findall(r"^[A-Za-z_][\w.]*(?:: .*)?$", text.partition(TRACEBACK)[2], re.MULTILINE)
+    raised = [line for line in raised if not line.startswith("Location:")]
+    if any(line.startswith("RecursionError") for line in raised):
+        return Message("its parts contain each other in a circle, or are nested too deeply")
+    return Message(
+        "its importer failed ({error}), so it is damaged or of a kind that the importer does not know",
+        error=raised[-1] if raised else "?",
+    )
 
 
 def check_output(path: Path) -> None:
@@ -100,8 +143,18 @@ def check_output(path: Path) -> None:
     check_folder(path)
 
 
+def check_length(path: Path, most: int) -> None:
+    """UserError if the file system or Blender cannot take a path, because it or the name of its file is too long."""
+    if len(os.fsencode(path.name)) > most or len(os.fsencode(path.resolve())) > PATH_BYTES:
+        raise UserError(
+            "{path} …: the name is too long: take at most {name} bytes, and {whole} with all folders",
+            path=str(path)[:80], name=most, whole=PATH_BYTES,
+        )  # fmt: skip
+
+
 def check_folder(path: Path) -> None:
-    """UserError unless the folder of a file exists."""
+    """UserError unless a file can be written to a path: its folder exists, and its name is not too long."""
+    check_length(path, WRITTEN_NAME)
     if not path.resolve().parent.is_dir():
         raise UserError("{path}: the folder {folder} does not exist", path=path, folder=path.resolve().parent)
     if path.is_dir():

@@ -22,7 +22,7 @@ class Told(Protocol):
     """What is told of the poses that were read: a report."""
 
     choices: list[str]
-    warnings: list[str]
+    left_out: list[str]
 
 
 def read_training_poses(context: bpy.types.Context, settings: WKSSegmentSettings, told: Told) -> list[Pose]:
@@ -58,7 +58,7 @@ def read_training_poses(context: bpy.types.Context, settings: WKSSegmentSettings
         told.choices += found.notes
         character = active_character(context, found.characters)
         names = list(poses.marked_frames(scene, settings.pose_count).values()) if source == "MARKERS" else None
-        return poses.read_frames(context, character, frames_of(character), names, told.warnings)
+        return poses.read_frames(context, character, frames_of(character), names, told.left_out)
 
 
 def active_character(context: bpy.types.Context, characters: Sequence[Character]) -> Character:

@@ -21,6 +21,7 @@ from .surfaces import DEFORMING, origins_of, read_surface
 SAME_SURFACE = 1e-5
 """Two poses are the same if no vertex moves by more than this fraction of the character's size; rounding of single
 precision is below it."""
+POINTS = "{names} has no faces, only points of a point cloud (a scan, Gaussian splats): make a mesh of them first"
 NO_FACES = "{names} has no faces: there is no surface to find segments on"
 NO_FACES_BUT_NODES = (
     "{names} has no faces: there is no surface to find segments on; if it consists of instances, add a Realize "
@@ -201,11 +202,8 @@ def read_shape_keys(context: bpy.types.Context, character: Character, count: int
     UserError
         If there are no shape keys except the basis, or all are muted.
     """
-    keyed = [obj for obj in character.objects if obj.data.shape_keys is not None]
-    names = list(
-        dict.fromkeys(block.name for obj in keyed for block in obj.data.shape_keys.key_blocks if not block.mute)
-    )
-    if len(names) < 2:
+    keyed, names = _keyed(character), shape_key_names(character)
+    if not names:
         raise UserError(
             '"{name}" has no shape keys that are not muted: add some, or take poses from elsewhere', name=character.name
         )
@@ -221,6 +219,18 @@ def read_shape_keys(context: bpy.types.Context, character: Character, count: int
     finally:
         for obj, active, pinned in before:
             obj.active_shape_key_index, obj.show_only_shape_key = active, pinned
+
+
+def shape_key_names(character: Character) -> list[str]:
+    """Names of the shape keys of a character that are not muted, with the basis; none if there is only the basis."""
+    names = dict.fromkeys(
+        block.name for obj in _keyed(character) for block in obj.data.shape_keys.key_blocks if not block.mute
+    )
+    return list(names) if len(names) > 1 else []
+
+
+def _keyed(character: Character) -> list[bpy.types.Object]:
+    return [obj for obj in character.objects if obj.data.shape_keys is not None]
 
 
 def evenly(first: int, last: int, count: int) -> list[int]:
@@ -310,6 +320,8 @@ def read_pose(context: bpy.types.Context, character: Character, name: str) -> Po
     proper = ~repeats_a_vertex(faces)
     if not (proper.any() and (polygon_of >= 0).any()):
         names = quoted(obj.name for obj in character.objects)
+        if n_vertices and not any(len(obj.data.edges) for obj in character.objects):
+            raise UserError(POINTS, names=names)
         nodes = any(modifier.type == "NODES" for obj in character.objects for modifier in obj.modifiers)
         raise UserError(NO_FACES_BUT_NODES if nodes else NO_FACES, names=names)
     try:

@@ -19,8 +19,8 @@ from ..scene.change_guard import ChangeGuard
 from ..scene.characters import group, selected_meshes
 from ..scene.pose_sources import active_character
 from ..scene.poses import Pose
-from . import model_library, pipeline
-from .pipeline import Run
+from . import describing, model_library
+from .describing import Run
 from .report import Report
 from .stored_messages import as_json, as_text
 
@@ -93,7 +93,7 @@ def rank_poses(models: Sequence[NamedModel], poses: Sequence[Pose], run: Run) ->
     fitted = [named.model for named in models]
     described: dict[int, list[PoseSignature]] = {}
     for alike, progress in run.progress.each(described_alike(fitted), "Reading"):
-        signatures = [each.pose for each in pipeline.describe(fitted[alike[0]], poses, run.with_progress(progress))]
+        signatures = [each.pose for each in describing.describe(fitted[alike[0]], poses, run.with_progress(progress))]
         described |= dict.fromkeys(alike, signatures)
     with run.report.stage("rank"):
         return rank(fitted, [described[i] for i in range(len(fitted))])

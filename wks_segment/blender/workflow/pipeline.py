@@ -1,32 +1,22 @@
-"""The steps that the operators and the command line share: describe, learn, label, soften, write.
+"""The steps that the operators and the command line share: learn, label, soften, write.
 
-`describe`, `learn`, `label` and `soften` need no Blender, so that a thread can run them; `LabelRequest.of` reads what
+`learn`, `label` and `soften` need no Blender, so that a thread can run them; `LabelRequest.of` reads what
 they need, `write_outputs` writes.
 """
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...core import (
-    Cache,
-    Connection,
-    PoseSegmentation,
-    SpectrumError,
-    SpectrumWarning,
-    Workpiece,
-    connect,
-)
+from ...core import PoseSegmentation, Workpiece
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ...core.message import Message, message_of
+from ...core.poses.describe import LEARNING
 from ...core.progress import Progress
-from ...core.segmentation import DESCRIBED
 from ...core.spectral.memory import available_memory
 from ..errors import TooLargeError, UserError
 from ..outputs.labels import write_labels
@@ -39,37 +29,12 @@ from ..scene.characters import Character, polygon_ranges, vertex_ranges
 from ..scene.mesh_arrays import Body
 from ..scene.poses import Pose
 from . import model_library, segment_list
+from .describing import Run, describe, prepare
 from .report import Report
 
 SEGMENT_SHARE = 0.6
 """Share of the labeling progress that is spent on segments; the rest tells left from right. A wrong share only makes
 the progress bar uneven."""
-
-
-@dataclass(frozen=True)
-class Run:
-    """What a computation reports to, and what it may use.
-
-    Attributes
-    ----------
-    report : Report
-        Collects facts and warnings.
-    progress : Progress
-        Told how far the computation is; can end it.
-    cache : optional
-        Signatures computed earlier; new ones are added.
-    workers : int, optional
-        Threads that describe poses at the same time, see `PoseSegmentation.describe_all`.
-    """
-
-    report: Report
-    progress: Progress = field(default_factory=Progress)
-    cache: Cache | None = None
-    workers: int | None = None
-
-    def with_progress(self, progress: Progress) -> Run:
-        """The same with another progress, usually a part of this one."""
-        return replace(self, progress=progress)
 
 
 @dataclass(frozen=True)
@@ -149,8 +114,10 @@ def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[Work
             faces=n_faces,
             segments=model.n_segments,
         )
-    described = describe(model, poses, run.with_progress(run.progress.part(0.0, DESCRIBED)))
-    progress = run.progress.titled("Learning the segments")
+    prepared = prepare(model, poses, run)
+    share = prepared.describing_share(LEARNING)
+    described = describe(model, poses, run.with_progress(run.progress.part(0.0, share)), prepared)
+    progress = run.progress.part(share, 1.0).titled("Learning the segments")
     with run.report.stage("mixture"):
         try:
             model.fit(described, progress, poses[0].upright, run.cache)
@@ -158,66 +125,6 @@ def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[Work
             raise UserError("The segments could not be learned: {reason}", reason=message_of(error)) from error
     run.report.add_model(model)
     return described
-
-
-def describe(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[Workpiece]:
-    """Describe each pose by its signature, so that it can be labeled.
-
-    Equal poses are described once, and poses in the cache not at all. Raises UserError if the core refuses a pose.
-    """
-    originals = [next((j for j in range(i) if pose.is_like(poses[j])), i) for i, pose in enumerate(poses)]
-    distinct = [i for i, original in enumerate(originals) if original == i]
-    with run.report.stage("connect"):
-        connections = _connections(model, poses, run.progress)
-    with run.report.stage("signature"), _solver_warnings(run.report):
-        try:
-            signatures = model.describe_all(
-                [poses[i].mesh for i in distinct],
-                [connections[i] for i in distinct],
-                run.progress.titled("Signature of {stage}"),
-                [Message('"{pose}"', pose=poses[i].name) for i in distinct],
-                workers=run.workers,
-                cache=run.cache,
-            )
-        except (ValueError, SpectrumError, MemoryError) as error:
-            raise UserError(message_of(error)) from error
-    described = dict(zip(distinct, map(Workpiece, signatures), strict=True))
-    run.report.laplacians = [described[original].pose.laplacian for original in originals]
-    return [described[original] for original in originals]
-
-
-def _connections(model: PoseSegmentation, poses: Sequence[Pose], progress: Progress) -> list[Connection]:
-    """Connection of each pose: one surface in all poses of a mesh, also where islands of it meet in some."""
-    connections: list[Connection] = []
-    for i, pose in enumerate(poses):
-        original = next(j for j, other in enumerate(poses) if pose.is_mesh_of(other))
-        if original < i:
-            connections.append(connections[original])
-            continue
-        progress(0.0, Message('Connecting "{pose}"', pose=pose.name))
-        same_mesh = [other.mesh for other in poses if pose.is_mesh_of(other)]
-        try:
-            connections.append(connect(*same_mesh, rest=pose.rest, pieces=model.pieces))
-        except ValueError as error:
-            raise UserError('"{pose}": {reason}', pose=pose.name, reason=message_of(error)) from error
-    return connections
-
-
-@contextmanager
-def _solver_warnings(report: Report) -> Iterator[None]:
-    """Move the eigensolver's warnings in this block to a report, and pass all others on after it."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        yield
-    report.warnings += dict.fromkeys(
-        message_of(warning.message)
-        for warning in caught
-        if isinstance(warning.message, Warning) and issubclass(warning.category, SpectrumWarning)
-    )
-    # Other code may have warned meanwhile in Blender's own thread.
-    for warning in caught:
-        if not issubclass(warning.category, SpectrumWarning):
-            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
 
 
 def label(
@@ -266,11 +173,13 @@ def _parts_of(model: PoseSegmentation, views: MeshViews, request: LabelRequest, 
     two_sides = request.sides == "two"
     min_share = None if model.preset == "paper" else request.min_share
     stage = Message('Labels of "{character}"', character=views.name)
+    step = progress.part(0.0, SEGMENT_SHARE if two_sides else 1.0, stage)
+    step(0.0)
     parts = model.segment_polygons(
         views.described,
         views.polygon_of_triangles,
         min_share,
-        progress.part(0.0, SEGMENT_SHARE if two_sides else 1.0, stage),
+        step,
         marked=views.body.marked,
     )
     if two_sides:

@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 
 from . import model_library, segment_list
+from .all_or_nothing import all_or_nothing
 from .live_session import session_of
 
 
@@ -27,8 +28,10 @@ class PropertyChanges:
 
     def rename_part(self, settings: Any, part: int, name: str) -> None:
         """Rename a part wherever its name is written."""
-        segment_list.rename(settings, part, name)
+        with all_or_nothing(bpy.context):
+            segment_list.rename(settings, part, name)
 
     def recolor_part(self, settings: Any, part: int, color: tuple[float, float, float]) -> None:
         """Recolor a part wherever its color is written."""
-        segment_list.recolor(settings, part, color)
+        with segment_list.leaving_edit_mode(bpy.context), all_or_nothing(bpy.context):
+            segment_list.recolor(settings, part, color)

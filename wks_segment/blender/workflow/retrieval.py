@@ -18,8 +18,8 @@ from ..scene import poses as reader
 from ..scene.animation import Choice, animated
 from ..scene.characters import Character, group, mesh_objects
 from ..scene.poses import Pose
-from . import pipeline
-from .pipeline import Run
+from . import describing, pipeline
+from .describing import Run
 from .report import Report
 
 LEARN_CLASS_SHARE = 0.6
@@ -101,7 +101,7 @@ def _learn_class(model: PoseSegmentation, poses: list[Pose], n_learned: int, run
     described = []
     for pose, progress in run.progress.each(asked):
         # Each alone: poses of one mesh that are described together share a connection, which a query must not.
-        described += pipeline.describe(model, [pose], run.with_progress(progress))
+        described += describing.describe(model, [pose], run.with_progress(progress))
     return [each.pose for each in described]
 
 

@@ -14,15 +14,17 @@ from ...core.mesh.triangle_mesh import IntArray
 from ...core.user_labels import LONGEST_NAME
 from ..outputs.color_attribute import recolor_faces
 from ..outputs.labels import rewrite_labels
-from ..outputs.materials import PART_PROPERTY, recolor_material
 from ..outputs.overrides import by_hand, keep_by_hand, model_labels
 from ..outputs.part_attributes import has_labels, labels_on
+from ..outputs.part_materials import part_of, restyle_material
+from ..outputs.separate import followed
 from ..outputs.vertex_groups import rename_group
 from ..parts import part_ids
 from ..parts.palette import most_different
 from ..props.settings import WKSSegmentSettings
 from ..scene.attributes import read_bools, read_floats
 from ..scene.characters import Character, mesh_objects, polygon_ranges, with_rigged
+from .all_or_nothing import all_or_nothing
 
 SUCCESSOR_OVERLAP = 0.5
 """Common area of an old and a new part, as a share of what they cover together, above which the new part is the old
@@ -38,7 +40,8 @@ def labeled(settings: WKSSegmentSettings, everywhere: bool = False) -> list[bpy.
     local = [obj for obj in mesh_objects(with_labels) if obj.library is None and obj.data.library is None]
     if everywhere:
         return local
-    in_edit_mode = [obj for obj in local if obj.mode == "EDIT"]
+    # In Object Mode, an object is in Edit Mode only in another window or beside the active one.
+    in_edit_mode = [obj for obj in local if obj.mode == "EDIT" and bpy.context.mode == "EDIT_MESH"]
     objects = settings.id_data.objects
     selected = with_rigged((obj for obj in objects if obj.select_get()), (obj for obj in objects if obj.visible_get()))
     return in_edit_mode or [obj for obj in local if obj in selected] or local
@@ -57,7 +60,7 @@ def fill(settings: WKSSegmentSettings) -> None:
     settings.faces_by_hand = 0
     for obj in labeled(settings):
         labels = labels_on(obj.data)
-        if labels is None:
+        if labels is None or (obj.data.is_editmode and bpy.context.mode != "EDIT_MESH"):
             continue
         # An object's scale counts, since the objects of a character can have different ones.
         scale = abs(np.linalg.det(np.array(obj.matrix_world)[:3, :3])) ** (2 / 3)
@@ -93,9 +96,10 @@ def activate(settings: WKSSegmentSettings, part: int) -> None:
 
 def rewrite_all(settings: WKSSegmentSettings, objects: list[bpy.types.Object] | None = None) -> None:
     """Write the labels of objects (None: of all in the scene) again with the user's current edits, and list them."""
-    notes = settings.notes()
-    for mesh in meshes_of(labeled(settings, everywhere=True) if objects is None else objects):
-        rewrite_labels(mesh, settings.style(), notes.joined)
+    notes, written = settings.notes(), labeled(settings, everywhere=True) if objects is None else objects
+    with followed(written):
+        for mesh in meshes_of(written):
+            rewrite_labels(mesh, settings.style(), notes.joined)
     fill(settings)
 
 
@@ -131,19 +135,17 @@ def recolor(settings: WKSSegmentSettings, part: int, color: tuple[float, float, 
 
 def restyle(settings: WKSSegmentSettings, part: int, name: bool = True, color: bool = True) -> None:
     """Write the current name or color of a part wherever it is written already."""
-    style = settings.style()
-    meshes = meshes_of(labeled(settings, everywhere=True))
-    for mesh in meshes if name else ():
-        rename_group(mesh, part, style)
-    with leaving_edit_mode(bpy.context) if color else nullcontext():
-        for mesh in meshes if color else ():
-            recolor_faces(mesh, part, style)
-    for material in bpy.data.materials:
-        if material.get(PART_PROPERTY) == part and material.library is None:
+    style, objects = settings.style(), labeled(settings, everywhere=True)
+    with leaving_edit_mode(bpy.context) if color else nullcontext(), followed(objects):
+        # A mesh can be in Edit Mode in another window.
+        for mesh in (mesh for mesh in meshes_of(objects) if not mesh.is_editmode or not color):
             if name:
-                material.name = style.name_of(part)
+                rename_group(mesh, part, style)
             if color:
-                recolor_material(material, part, style)
+                recolor_faces(mesh, part, style)
+        for material in bpy.data.materials:
+            if part_of(material) == part:
+                restyle_material(material, style, name, color)
 
 
 def make_part(settings: WKSSegmentSettings, name: str, side: int = 0) -> int:
@@ -210,7 +212,10 @@ def _successors(labels: Mapping[Character, IntArray]) -> dict[int, int]:
 
 @contextmanager
 def leaving_edit_mode(context: bpy.types.Context) -> Iterator[None]:
-    """Leave Edit Mode for the block, because Blender reads and writes whole attributes only outside it."""
+    """Leave Edit Mode for the block, because Blender reads and writes whole attributes only outside it.
+
+    An error in the block leaves everything as it was before.
+    """
     if context.mode != "EDIT_MESH":
         yield
         return
@@ -218,7 +223,8 @@ def leaving_edit_mode(context: bpy.types.Context) -> Iterator[None]:
     selected = {obj: obj.select_get() for obj in context.view_layer.objects}
     bpy.ops.object.mode_set(mode="OBJECT")
     try:
-        yield
+        with all_or_nothing(context):
+            yield
     finally:
         # Blender enters Edit Mode with all selected objects.
         for obj in selected:

@@ -21,15 +21,15 @@ from ..scene.characters import Character, evaluated_objects, group, mesh_objects
 from ..scene.pose_sources import read_training_poses
 from ..scene.poses import Pose
 from ..scene.simulations import check_simulations
-from . import model_library, pipeline
-from .pipeline import LabelRequest, Run
-from .report import Report, pose_warnings, segment_warnings
+from . import describing, model_library, pipeline
+from .describing import Run
+from .pipeline import LabelRequest
+from .report import Report, pose_warnings, segment_warnings, shape_warnings
 
-LEARN_SHARE, DESCRIBE_SHARE = 0.9, 0.6
-"""Share of the progress bar before labeling, when a model is learned and when one is applied: learning takes longer.
-Wrong shares only make the bar and the time left uneven."""
-LABEL_SHARE = 0.7
-"""Share of labels in the rest of the bar; soft weights get what remains."""
+LEARN_SHARE = 0.97
+"""Share of the progress of a job that learns before labeling: what takes long is known from learning."""
+SOFT_SHARE = 0.3
+"""Share of soft weights in the progress of labeling."""
 
 
 @dataclass
@@ -83,9 +83,8 @@ class SegmentationJob:
         settings, report = context.scene.wks_segment, Report([])
         with report.stage("read"):
             report.poses = read_training_poses(context, settings, report)
-        left_out = len(report.warnings)
-        asked = {"FRAMES": settings.pose_count - left_out, "MARKERS": 1}.get(settings.source)
-        report.warnings += pose_warnings(report.poses, asked)
+        asked = {"FRAMES": settings.pose_count - len(report.left_out), "MARKERS": 1}.get(settings.source)
+        report.warn(*report.left_out, *pose_warnings(report.poses, asked))
         return cls._read(context, settings.new_model(), report, cache, learns=True)
 
     @classmethod
@@ -122,6 +121,7 @@ class SegmentationJob:
         cls, context: bpy.types.Context, model: PoseSegmentation, report: Report, cache: Cache, learns: bool
     ) -> SegmentationJob:
         settings, poses = context.scene.wks_segment, report.poses
+        report.warn(*shape_warnings(poses))
         with report.stage("read"):
             characters = [pose.character for pose in poses]
             request, guard = LabelRequest.of(settings, characters), ChangeGuard(context.scene, characters)
@@ -159,18 +159,26 @@ class SegmentationJob:
 
         Touches nothing of Blender, so that a thread can run it.
         """
-        label_start = LEARN_SHARE if self.learns else DESCRIBE_SHARE
-        weight_start = label_start + (1 - label_start) * LABEL_SHARE
+        with_described = progress
         if not self.described:
-            run = Run(self.report, progress.part(0.0, label_start), self.cache)
-            describe = pipeline.learn if self.learns else pipeline.describe
-            self.described = describe(self.model, self.poses, run)
-        run = Run(self.report, progress.part(label_start, weight_start))
+            with_described = self._describe(progress)
+        labeled = 1.0 - SOFT_SHARE if self.request.outputs.vertex_groups == "soft" else 1.0
+        run = Run(self.report, with_described.part(0.0, labeled))
         self.labels = pipeline.label(self.model, self.poses, self.described, self.request, run)
-        run = Run(self.report, progress.part(weight_start, 1.0))
+        run = Run(self.report, with_described.part(labeled, 1.0))
         self._weights = pipeline.soften(self.model, self.poses, self.described, self.labels, self.request, run)
         if self.learns:
             self.report.warnings += segment_warnings(self.model, self.report)
+
+    def _describe(self, progress: Progress) -> Progress:
+        """Describe the poses, and learn from them if asked to; the progress of the rest."""
+        run = Run(self.report, progress, self.cache)
+        if self.learns:
+            run = run.with_progress(progress.part(0.0, LEARN_SHARE))
+            self.described = pipeline.learn(self.model, self.poses, run)
+            return progress.part(LEARN_SHARE, 1.0)
+        self.described, rest = describing.describe_to_label(self.model, self.poses, run)
+        return rest
 
     def write(self, follows: bool = False) -> None:
         """Write the labels, and the model if it was learned; ChangedError, and nothing written, if the scene changed.

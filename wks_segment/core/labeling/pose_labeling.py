@@ -16,6 +16,7 @@ from ..mesh.adjacency import connected_regions
 from ..mesh.triangle_mesh import FloatArray, IntArray
 from ..message import Message
 from ..parts.kind_traits import KindTraits
+from ..poses.arguments import as_list
 from ..poses.describe import PoseDescriber
 from ..poses.pose_cache import AnyPose, Workpiece
 from ..progress import Progress, ShareFunction
@@ -177,7 +178,8 @@ class PoseLabeling(PoseDescriber):
     def _poses_of_mesh(self, poses: Sequence[AnyPose], polygons: Sequence[IntArray]) -> list[Workpiece]:
         """Described poses of one mesh; ValueError if there are none, or the polygons do not fit."""
         self._fitted()
-        described = [self._described(pose) for pose in poses]
+        polygons = as_list(polygons, "polygons")
+        described = [self._described(pose) for pose in as_list(poses, "poses")]
         if not described or len(described) != len(polygons):
             raise ValueError(
                 Message("there are {poses} poses, but polygons for {given}", poses=len(described), given=len(polygons))

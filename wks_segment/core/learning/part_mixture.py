@@ -57,8 +57,8 @@ VANISHED = 0.5
 """A kind that keeps less than this share of its area when borders move is merged before all others."""
 K_MEANS_ROUNDS = 10
 """Most rounds of k-means: later ones move places between clusters of one kind, and carry noise on."""
-FOUND = 0.7
-"""Share of the time of learning after which the kinds are found."""
+FOUND = 0.63
+"""Share of the time of finding parts and fitting the mixture after which the kinds are found."""
 
 
 @dataclass(frozen=True)

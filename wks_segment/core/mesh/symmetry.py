@@ -63,7 +63,7 @@ def mirror_normal(mesh: TriangleMesh, preferred: FloatArray, others: FloatArray)
         Further unit normals to try, beside the body's own principal axes, among which the normal of the mirror plane of
         an exactly symmetric body is.
     """
-    normals = np.vstack([preferred, others, _principal_axes(*_points_on(mesh))])
+    normals = np.vstack([preferred, others, _principal_axes(mesh)])
     distances = mirror_distances(mesh, normals)
     best = int(distances.argmin())
     is_wrong = distances[0] >= SYMMETRIC
@@ -106,7 +106,15 @@ def _points_on(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
     return np.concatenate(points), np.concatenate(weights) + np.finfo(float).tiny
 
 
-def _principal_axes(points: FloatArray, weights: FloatArray) -> FloatArray:
-    """(3, 3) principal axes of weighted points, as rows."""
-    offsets = points - np.average(points, axis=0, weights=weights)
-    return np.asarray(np.linalg.eigh((offsets * weights[:, None]).T @ offsets)[1].T)
+def _principal_axes(mesh: TriangleMesh) -> FloatArray:
+    """(3, 3) principal axes of a surface, as rows.
+
+    They are of all its points, not of its vertices like those of `canonical.Frame`, which depend on the diagonals that
+    squares are cut along: by 1° on a figure of boxes, so that its mirror plane would not be found.
+    """
+    weights = mesh.face_areas / mesh.area
+    corners = mesh.vertices[mesh.faces] - weights @ mesh.face_centers
+    points = np.concatenate([corners.reshape(-1, 3), 3 * corners.mean(axis=1)])
+    # The integral of x xᵀ over a triangle is its area / 12 times the sum over its corners and over their sum.
+    of_points = np.concatenate([np.repeat(weights, 3), weights])
+    return np.asarray(np.linalg.eigh((points * of_points[:, None]).T @ points)[1].T)

@@ -18,7 +18,7 @@ PLACES = 8
 """Number of places on a line of sight that must be inside: gaps that matter are wider than their distance."""
 SLACK = 0.004
 """How far outside, in units of the square root of the area, a line of sight may run, since surfaces are bent."""
-SLANT = 0.05
+OUTWARD = 0.05
 """Sine of the angle by which a line may leave the surface on the outer side: faces of one flat patch see each other."""
 NORMAL_LENGTH = 0.012
 """Length over which normals are averaged, in the same unit."""
@@ -38,7 +38,7 @@ def visible(pose: Workpiece, faces: IntArray, progress: Progress | None = None) 
     count = len(faces)
     first, second = np.triu_indices(count, 1)
     lines = places[second] - places[first]
-    limit = SLACK + SLANT * np.linalg.norm(lines, axis=1)
+    limit = SLACK + OUTWARD * np.linalg.norm(lines, axis=1)
     inward = (np.einsum("ij,ij->i", lines, directions[first]) < limit) & (
         np.einsum("ij,ij->i", lines, directions[second]) > -limit
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
 from functools import partial
 from typing import Literal
@@ -19,6 +19,7 @@ from ..spectral.intrinsic_delaunay import Laplacian, better_triangles
 from ..spectral.memory import available_memory
 from ..spectral.signature import wave_kernel_signature_of
 from ..threads import one_blas_thread
+from .arguments import as_list
 from .pose_cache import AnyPose, Workpiece
 from .pose_signature import PoseSignature
 from .signature_cache import SignatureCache, signature_key
@@ -31,6 +32,27 @@ PROGRESS_SECONDS = 0.1
 """Seconds between two reports of progress, and so the longest time until a job notices that it is canceled."""
 BESIDE_EIGENPAIRS = 1.5
 """Time of a whole job as a multiple of the time of its eigenpairs, about."""
+
+SURFACE = 0.06
+"""Share of the time of a pose after which its surface is prepared."""
+LEARNING, LABELING = 0.4, 0.07
+"""Time to learn from a pose, and to label one with a given model, in units of the time of its signature: medians of ten
+characters, of which the signature is between half and nine tenths of the time."""
+
+
+def describing_share(n_new: int, n_poses: int, rest: float) -> float:
+    """Share of the time of a job that is spent on signatures.
+
+    Parameters
+    ----------
+    n_new : int
+        Number of poses whose signature must be computed.
+    n_poses : int
+        Number of all poses of the job.
+    rest : float
+        Time of the rest of the job for each pose, in units of the time of a signature.
+    """
+    return n_new / (n_new + rest * n_poses)
 
 
 class PoseDescriber:
@@ -92,6 +114,7 @@ class PoseDescriber:
         n_pairs = self.n_eigenpairs + surface.n_islands - 1
         mesh, laplacian = better_triangles(surface.mesh, self._laplacian())
         step = Progress.of_share(progress)
+        step = step.part(SURFACE, 1.0)
         signature = wave_kernel_signature_of(mesh, n_pairs, self.n_energies, self.accuracy, step)
         pose = PoseSignature(surface, signature, self.n_eigenpairs, laplacian)
         if cache is not None:
@@ -116,12 +139,13 @@ class PoseDescriber:
     @one_blas_thread  # poses run in parallel instead: matrices this narrow gain nothing from more threads
     def describe_all(
         self,
-        meshes: Sequence[TriangleMesh],
+        meshes: Iterable[TriangleMesh],
         connections: Sequence[Connection] | None = None,
         progress: ReportFunction | Progress | None = None,
         names: Sequence[str] | None = None,
         workers: int | None = None,
         cache: SignatureCache | None = None,
+        known: Sequence[PoseSignature | None] = (),
     ) -> list[PoseSignature]:
         """`describe` several poses, in parallel if there are cores and memory for it.
 
@@ -140,17 +164,22 @@ class PoseDescriber:
             Number of poses at once; if not given, as many as there are cores and memory for, at most four.
         cache : SignatureCache, optional
             Searched for signatures first; each new signature is added to it as soon as it is computed.
+        known : one for each pose, optional
+            Result of `known_signatures`, if that was called before: the cache is not searched again for these.
 
         Raises
         ------
         ValueError, SpectrumError, MemoryError
             As by `describe`; the message begins with the name of the pose.
         """
-        if not len(meshes):
+        meshes = as_list(meshes, "meshes")
+        if not meshes:
             return []
         called = names or [Message("pose {number}", number=i + 1) for i in range(len(meshes))]
         connected = connect_alike(meshes, called, self.pieces) if connections is None else connections
-        shared = _SharedProgress(Progress.of(progress), names, len(meshes))
+        found = list(known) or [None] * len(meshes)
+        new = [i for i, signature in enumerate(found) if signature is None]
+        shared = _SharedProgress(Progress.of(progress), names, new, len(meshes))
 
         def describe_one(i: int) -> PoseSignature:
             try:
@@ -162,9 +191,9 @@ class PoseDescriber:
                 shared.finish(i)
 
         with ThreadPoolExecutor(workers or self._workers(meshes)) as pool:
-            futures = [pool.submit(describe_one, i) for i in range(len(meshes))]
+            futures = {i: pool.submit(describe_one, i) for i in new}
             try:
-                waiting = set(futures)
+                waiting = set(futures.values())
                 while waiting:
                     shared.report()
                     finished, waiting = wait(waiting, PROGRESS_SECONDS, FIRST_COMPLETED)
@@ -172,11 +201,20 @@ class PoseDescriber:
                         future.result()
             except BaseException:
                 shared.cancel()
-                for future in futures:
+                for future in futures.values():
                     future.cancel()
                 raise
         shared.report()
-        return [future.result() for future in futures]
+        return [futures[i].result() if signature is None else signature for i, signature in enumerate(found)]
+
+    def known_signatures(
+        self, meshes: Sequence[TriangleMesh], connections: Sequence[Connection], cache: SignatureCache | None
+    ) -> list[PoseSignature | None]:
+        """The signature of each pose that is in a cache; None for those that must be computed."""
+        if cache is None:
+            return [None] * len(meshes)
+        keys = [signature_key(*pose, self.describing()) for pose in zip(meshes, connections, strict=True)]
+        return [cache.get(key) for key in keys]
 
     def estimate(self, meshes: Sequence[TriangleMesh]) -> tuple[float, int]:
         """Rough estimate of the seconds and bytes that `describe_all` will take.
@@ -214,11 +252,26 @@ class PoseDescriber:
 
     def _all_described(
         self, meshes: Sequence[AnyPose], progress: Progress, cache: SignatureCache | None
-    ) -> list[Workpiece]:
-        """The poses with their signatures, which are computed for those that have none."""
+    ) -> tuple[list[Workpiece], float]:
+        """The poses with their signatures, which are computed for those that have none, and the share of learning then.
+
+        Parameters
+        ----------
+        meshes
+        progress : Progress
+            Of learning from the poses.
+        cache : SignatureCache or None
+        """
         new = {i: mesh for i, mesh in enumerate(meshes) if isinstance(mesh, TriangleMesh)}
-        signatures = dict(zip(new, self.describe_all(list(new.values()), None, progress, cache=cache), strict=True))
-        return [self._described(signatures.get(i, mesh)) for i, mesh in enumerate(meshes)]
+        bare = list(new.values())
+        names = [Message("pose {number}", number=i + 1) for i in range(len(bare))]
+        connections = connect_alike(bare, names, self.pieces)
+        known = self.known_signatures(bare, connections, cache)
+        share = describing_share(known.count(None), len(meshes), LEARNING)
+        part = progress.part(0.0, share)
+        signatures = self.describe_all(bare, connections, part, cache=cache, known=known)
+        described = dict(zip(new, signatures, strict=True))
+        return [self._described(described.get(i, mesh)) for i, mesh in enumerate(meshes)], share
 
     def _n_refined(self, mesh: TriangleMesh) -> int:
         """About how many vertices the refined surface has: the mesh's own vertices stay, refining adds the others."""
@@ -240,12 +293,14 @@ class _SharedProgress:
         Of all poses together.
     names : sequence of str, optional
         Of the poses, for the stage that is reported.
+    new : sequence of int
+        The poses that are described; the signatures of the others are known.
     n_poses : int
     """
 
-    def __init__(self, progress: Progress, names: Sequence[str] | None, n_poses: int) -> None:
-        self._progress, self._names = progress, names
-        self._done = [0.0] * n_poses
+    def __init__(self, progress: Progress, names: Sequence[str] | None, new: Sequence[int], n_poses: int) -> None:
+        self._progress, self._names, self._n_poses = progress, names, n_poses
+        self._done = dict.fromkeys(new, 0.0)
         self._canceled = threading.Event()
 
     def of_pose(self, i: int) -> Progress:
@@ -262,13 +317,13 @@ class _SharedProgress:
 
     def report(self) -> None:
         """Report the mean over the poses, under the name of the first pose that is not done."""
-        count = len(self._done)
-        current = next((i for i, share in enumerate(self._done) if share < 1), count - 1)
+        current = next((i for i, share in self._done.items() if share < 1), self._n_poses - 1)
         if self._names is None:
-            stage = Message("pose {number} of {count}", number=current + 1, count=count)
+            stage = Message("pose {number} of {count}", number=current + 1, count=self._n_poses)
         else:
-            stage = Message("{name} ({number} of {count})", name=self._names[current], number=current + 1, count=count)
-        self._progress(sum(self._done) / count, stage)
+            name = self._names[current]
+            stage = Message("{name} ({number} of {count})", name=name, number=current + 1, count=self._n_poses)
+        self._progress(sum(self._done.values()) / len(self._done) if self._done else 1.0, stage)
 
     def _note(self, i: int, share: float) -> None:
         self._done[i] = share

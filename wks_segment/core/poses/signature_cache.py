@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import hashlib
 import os
-import tempfile
 import threading
 import time
+import uuid
 import zipfile
 import zlib
 from collections import OrderedDict
@@ -153,8 +153,8 @@ class MemoryCache:
 class DiskCache:
     """Cache in the files of a folder; the least recently used files are removed first.
 
-    Several processes may use the folder at once: a file appears as a whole or not at all, and a damaged file counts as
-    missing.
+    Several processes and users may use the folder at once: a file appears as a whole or not at all, a damaged file
+    counts as missing, and a file can be read by all who can read other new files of its user (`umask`).
 
     Parameters
     ----------
@@ -187,15 +187,17 @@ class DiskCache:
         try:
             with np.load(path, allow_pickle=False) as file:
                 arrays = dict(file)
-            os.utime(path)
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
             return None
+        with suppress(OSError):  # the file of another user can be read, but not marked as used
+            os.utime(path)
         return arrays
 
     def keep(self, key: str, arrays: Mapping[str, NDArray[Any]]) -> None:
         """See `Cache`; OSError if the file cannot be written."""
-        with tempfile.NamedTemporaryFile(dir=self.folder, suffix=UNFINISHED_SUFFIX, delete=False) as file:
-            unfinished = Path(file.name)
+        # Not by `tempfile`, whose files can be read by one user alone.
+        unfinished = self.folder / f"{uuid.uuid4().hex}{UNFINISHED_SUFFIX}"
+        with unfinished.open("xb") as file:
             try:
                 np.savez(file, **arrays)
             except BaseException:
@@ -204,7 +206,7 @@ class DiskCache:
                 raise
         try:
             unfinished.replace(self._path(key))
-        except PermissionError:  # on Windows, while another process reads the same file: then it exists already
+        except PermissionError:  # it exists, and another user's is protected, or on Windows another process reads it
             unfinished.unlink()
         self._remove_old_files()
 
@@ -215,7 +217,7 @@ class DiskCache:
         """Remove files above the limit, and abandoned ones. Other processes may do so at the same time."""
         files = []
         for path in self.folder.iterdir():
-            with suppress(FileNotFoundError):
+            with suppress(FileNotFoundError, PermissionError):
                 state = path.stat()
                 if path.suffix == CACHE_SUFFIX:
                     files.append((state.st_mtime_ns, state.st_size, path))

@@ -47,6 +47,8 @@ DENSE_AT_MOST = 4_000
 """Number of vertices up to which the dense solver is used if a large part of all pairs is asked for."""
 CURVE_BITS = 10
 """Bits for each coordinate along the curve by which vertices are sorted: 1024 steps along the longest side."""
+TRIED = 0.95
+"""Share of the progress that stands when the fast solver has failed and the exact one begins."""
 
 
 @one_blas_thread
@@ -244,6 +246,7 @@ def _solve_problem(
     zero_modes = problem.zero_modes()[:, :n_pairs]
     n_zero = zero_modes.shape[1]
     count = n_pairs - n_zero
+    tried = 0.0
     dense = n <= DENSE_BELOW or (n_pairs > n // 9 and n <= DENSE_AT_MOST)
     if count and not dense and accuracy == "fast":
         try:
@@ -254,11 +257,14 @@ def _solve_problem(
             text = "the fast eigensolver did not converge on this mesh, so the exact one was used"
             warnings.warn(text, SpectrumWarning, stacklevel=5)
             _check_memory(n, n_pairs, "exact")
+            tried = TRIED
     values, vectors = np.zeros(0), np.zeros((n, 0))
     if count and dense:
         values, vectors = _solve_densely(problem.operator(), zero_modes, count)
     elif count:
-        values, vectors = lanczos_eigenpairs(problem.operator(), Level.of(problem.mesh), zero_modes, count, progress)
+        values, vectors = lanczos_eigenpairs(
+            problem.operator(), Level.of(problem.mesh), zero_modes, count, progress.part(tried, 1.0)
+        )
     functions = np.concatenate([zero_modes, vectors], axis=1)
     functions /= problem.mass_roots()[:, None]
     return np.concatenate([np.zeros(n_zero), values]), _prepended(functions, iter(()))

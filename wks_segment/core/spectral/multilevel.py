@@ -46,6 +46,15 @@ MAX_CORRECTIONS = 4
 LEAST_VALUE = 1e-6
 """Fraction of the last eigenvalue below which the first one is rounding, or needs more digits than there are."""
 
+PREPARED, COARSE_SOLVED, CORRECTED, CERTAIN = 0.15, 0.3, 0.34, 0.9
+"""Shares of the time of a solve after which the coarse space is made and solved, its functions are corrected, and the
+pairs are certain. In between, rounds enlarge the space and correct again. The dense coarse problem cannot report, so
+that the first share is ahead of the time and the second one behind."""
+LEFT_BY_ROUND, LEFT_BY_SLOW_ROUND, SLOW_CHANGE = 0.15, 0.45, 0.4
+"""Share of the time until the pairs are certain that a round leaves. Mostly one round suffices, and two to three if the
+first correction changes a hundredth of the functions by more than the last number: so on 10 of 11 characters."""
+ENLARGED = 0.95
+"""Share of the time of a round after which the space is enlarged; the correction is quick."""
 CELL_LEVEL_ABOVE = 180_000
 """Number of vertices above which a level of cells is inserted between the coarse space and the surface. It has so many
 cells that its functions seldom need a correction on the surface."""
@@ -128,29 +137,36 @@ def _solve(
     n_cells = max(round(per_pair * count), 2 * (count + n_zero))
     while 2 * n_cells < len(level.areas):
         prolongation, cells = level.coarsened(n_cells, wide=True)
-        progress(0.2)
+        progress(PREPARED)
         values, weights = coarse_eigenpairs(cells, n_zero, round((1 + SPARE_PAIRS) * count) + LEAST_SPARE)
         if len(values) < count:
             n_cells *= 2
             continue
         vectors = block_product(prolongation, weights, FAST_COLUMNS)
-        progress(0.5)
+        progress(COARSE_SOLVED)
+        done, end = COARSE_SOLVED, CORRECTED
         for step in range(MAX_CORRECTIONS):
             changes = np.empty(len(values))
             for columns in panels(len(vectors), len(values)):
                 panel = np.ascontiguousarray(vectors[:, columns])
                 values[columns], changes[columns] = correction(values[columns], panel)
                 vectors[:, columns] = panel
-                progress(0.5 + 0.4 * columns.stop / len(values))
+                progress(done + (end - done) * columns.stop / len(values))
             if not changes[:count].max() <= (LARGEST_LATER_CHANGE if step else LARGEST_CHANGE):
-                values, vectors = _enlarged(correction, vectors)
+                if step == 0:
+                    left = LEFT_BY_SLOW_ROUND if np.quantile(changes, 0.99) > SLOW_CHANGE else LEFT_BY_ROUND
+                begun, end = end, CERTAIN - left * (CERTAIN - end)
+                done = begun + ENLARGED * (end - begun)
+                values, vectors = _enlarged(correction, vectors, progress.part(begun, done))
                 continue
             # The residual of a Ritz vector is orthogonal to all others, and so nearly is its correction.
             order = np.argsort(values, kind="stable")[:count]
             if values[order[0]] > LEAST_VALUE * values[order[-1]]:
+                progress(CERTAIN)
                 return values[order], vectors[:, order]
             break
         n_cells *= 2
+        progress = progress.part(CERTAIN, 1.0)
     raise NotConvergedError("corrections stay large")
 
 
@@ -198,19 +214,22 @@ class _Correction:
         return self.factor.solve(residual), residual, weighted
 
 
-def _enlarged(correction: _Correction, vectors: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _enlarged(correction: _Correction, vectors: FloatArray, progress: Progress) -> tuple[FloatArray, FloatArray]:
     """The same number of eigenpairs, best within the span of the vectors and their large changes.
 
     This finds functions that are hardly in the coarse space, as those of thin parts of the shape.
     """
     level = correction.level
     zero_modes = level.zero_modes()
-    values, vectors = _lowest_in_span(level, _without(zero_modes, level, vectors), vectors.shape[1])
+    values, vectors = _lowest_in_span(
+        level, _without(zero_modes, level, vectors), vectors.shape[1], progress.part(0.0, 0.3)
+    )
     large: list[FloatArray] = []
     for columns in panels(*vectors.shape):
         changes = correction.change(values[columns], np.ascontiguousarray(vectors[:, columns]))[0]
         squares = _dots(changes, _weighted(level, changes))
         large.append(changes[:, squares > LEAST_USEFUL_CHANGE**2])
+        progress(0.3 + 0.2 * columns.stop / len(values))
     changes = np.hstack(large)
     if not changes.shape[1]:
         return values, vectors
@@ -218,13 +237,16 @@ def _enlarged(correction: _Correction, vectors: FloatArray) -> tuple[FloatArray,
     squares, directions = np.linalg.eigh((changes.T @ _weighted(level, changes)).astype(np.float64))
     kept = squares > LEAST_DIRECTION * squares[-1]
     changes = changes @ (directions[:, kept] / np.sqrt(squares[kept])).astype(np.float32)
-    return _lowest_in_span(level, np.hstack([vectors, changes]), vectors.shape[1])
+    return _lowest_in_span(level, np.hstack([vectors, changes]), vectors.shape[1], progress.part(0.5, 1.0))
 
 
-def _lowest_in_span(level: Level, basis: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
+def _lowest_in_span(level: Level, basis: FloatArray, count: int, progress: Progress) -> tuple[FloatArray, FloatArray]:
     """The lowest eigenpairs within the span of a basis."""
     energy = basis.T @ _stiff(level, basis)
-    return rayleigh_ritz(basis, energy, basis.T @ _weighted(level, basis), count)
+    progress(0.3)
+    squares = basis.T @ _weighted(level, basis)
+    progress(0.8)  # before the dense eigenproblem, which takes half of the time and cannot report
+    return rayleigh_ritz(basis, energy, squares, count)
 
 
 def _without(known: FloatArray, level: Level, vectors: FloatArray) -> FloatArray:

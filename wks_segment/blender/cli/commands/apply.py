@@ -12,9 +12,9 @@ from ....core.progress import Progress
 from ...errors import UserError
 from ...scene import file_formats
 from ...scene.poses import Pose
-from ...workflow import model_library, pipeline
+from ...workflow import describing, model_library, pipeline
+from ...workflow.describing import Run
 from ...workflow.model_ranking import NamedModel, largest, rank_poses, verdict_message
-from ...workflow.pipeline import Run
 from ...workflow.report import Report
 from ..command_options import (
     add_labeling_settings,
@@ -27,6 +27,9 @@ from ..command_options import (
 )
 from ..reading import read_models, read_poses
 from ..results import check_outputs, label_and_write, result_of
+
+RANKED = 0.9
+"""Share of the time after which the best model is known: its signatures serve to label as well."""
 
 
 def add(commands: Any) -> None:
@@ -54,7 +57,8 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
         poses = read_poses(options, run.report, single=False)
         # Signatures that are computed for the ranking serve to label as well.
         run = replace(run, cache=run.cache or MemoryCache())
-        ranking = _rank(models, poses, options, run)
+        ranking = _rank(models, poses, options, run.with_progress(run.progress.part(0.0, RANKED)))
+        run = run.with_progress(run.progress.part(RANKED, 1.0))
         chosen = models[ranking.best.index]
         verdict = {"best": chosen.name, "verdict": ranking.verdict}
     model = chosen.model
@@ -64,8 +68,8 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     if options.smoothness is not None:
         model.smoothness = settings.smoothness
     pipeline.check_limits(model, poses, settings)
-    described = pipeline.describe(model, poses, run)
-    label_and_write(model, poses, described, settings, options, run)
+    described, rest = describing.describe_to_label(model, poses, run)
+    label_and_write(model, poses, described, settings, options, run.with_progress(rest))
     if options.output:
         file_formats.save_scene(options.output)
     return result_of(options, run.report) | verdict

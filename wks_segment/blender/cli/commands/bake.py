@@ -19,8 +19,9 @@ from ...props.settings import WKSSegmentSettings
 from ...scene import file_formats
 from ...scene.characters import Character
 from ...scene.poses import Pose
-from ...workflow import model_library, pipeline
-from ...workflow.pipeline import LabelRequest, Run
+from ...workflow import describing, model_library, pipeline
+from ...workflow.describing import Run
+from ...workflow.pipeline import LabelRequest
 from ...workflow.report import Report
 from ..command_options import BAKE_OPTIONS, add_labeling_settings, add_object, add_settings, settings_from
 from ..reading import read_poses
@@ -81,7 +82,7 @@ def _label(
     if options.smoothness is not None:
         model.smoothness = settings.smoothness
     pipeline.check_limits(model, poses, settings)
-    described = pipeline.describe(model, poses, run)
+    described = describing.describe(model, poses, run)
     request = LabelRequest.of(settings, characters)
     labels = pipeline.label(model, poses, described, request, run)
     pipeline.write_outputs(settings, labels, request, run.report)

@@ -17,11 +17,12 @@ from ...scene.animation import animated
 from ...scene.characters import Character, quoted
 from ...scene.poses import own_frames
 from ...scene.simulations import check_simulations
-from ...workflow.pipeline import Run
+from ...workflow.describing import Run
 from ...workflow.report import Report
 from ..command_options import OUTPUT_OPTIONS, SEGMENTATION_OPTIONS, add_object, add_settings, settings_from
 from ..demo_scene import Demo, creature_in
-from ..reading import characters_in, choice_of, set_action
+from ..file_characters import characters_in, set_action
+from ..reading import choice_of
 
 
 def add(commands: Any) -> None:

@@ -11,8 +11,8 @@ from ....core import Ranking
 from ....core.progress import Progress
 from ...render.confusion_matrix import render_matrix
 from ...workflow import pipeline
+from ...workflow.describing import Run
 from ...workflow.model_ranking import NamedModel, largest, rank_poses, verdict_message
-from ...workflow.pipeline import Run
 from ...workflow.report import Report
 from ...workflow.retrieval import evaluate
 from ..command_options import add_poses, add_resources, add_settings, cache_from, settings_from

@@ -9,10 +9,11 @@ from typing import Any
 from ....core.progress import Progress
 from ...scene import file_formats
 from ...workflow import model_library, pipeline
-from ...workflow.pipeline import Run
+from ...workflow.describing import Run
 from ...workflow.report import Report, pose_warnings, segment_warnings
+from ...workflow.segmentation_job import LEARN_SHARE
 from ..command_options import add_outputs, add_poses, add_resources, add_settings, cache_from, settings_from
-from ..reading import read_poses
+from ..reading import read_poses, warn_at_once
 from ..results import check_outputs, label_and_write, result_of, save_model
 
 
@@ -40,19 +41,20 @@ def _segment(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     if options.model:
         file_formats.check_folder(options.model)
     poses = read_poses(options, run.report)
-    left_out = len(run.report.warnings)
+    asked = None if options.frames is None else options.frames[2] - len(run.report.left_out)
+    warn_at_once(run.report, *pose_warnings(poses, asked))
     settings = settings_from(options)
     model = settings.new_model()
     pipeline.check_limits(model, poses, settings)
-    described = pipeline.learn(model, poses, run)
+    described = pipeline.learn(model, poses, run.with_progress(run.progress.part(0.0, LEARN_SHARE)))
     if options.model:
         save_model(model, options.model)
     model_library.store_active(settings)
     if options.output or options.render:
-        label_and_write(model, poses, described, settings, options, run, renumbered=True)
+        rest = run.with_progress(run.progress.part(LEARN_SHARE, 1.0))
+        label_and_write(model, poses, described, settings, options, rest, renumbered=True)
         run.report.warnings += segment_warnings(model, run.report)
     model_library.keep(settings, model, run.report.facts, poses[0].character.name, add=True)
     if options.output:
         file_formats.save_scene(options.output)
-    run.report.warnings += pose_warnings(poses, None if options.frames is None else options.frames[2] - left_out)
     return result_of(options, run.report)

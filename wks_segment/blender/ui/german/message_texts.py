@@ -148,6 +148,23 @@ GERMAN_MESSAGES = {
     '"{name}" is an instance: make it real first (Object > Apply > Make Instances Real)': '"{name}" ist eine Instanz: erst ein echtes Objekt daraus machen (Object > Apply > Make Instances Real)',
     '"{name}" is linked from another file: make it local first (Object > Relations)': '"{name}" ist aus einer anderen Datei verknüpft: erst lokal machen (Object > Relations)',
     '"{name}" is in Edit Mode: leave it first (Tab)': '"{name}" ist im Edit-Modus: ihn erst verlassen (Tab)',
+    '"{name}" is in Edit Mode through "{other}", which has the same mesh: leave it first (Tab)': (
+        '"{name}" ist durch "{other}" mit demselben Mesh im Edit-Modus: ihn erst verlassen (Tab)'
+    ),
+    'The mesh of "{name}" is a library override, of which Blender would not save the segments: make it local first '
+    "(Object > Relations > Make Local)": (
+        'Das Mesh von "{name}" ist ein Library Override, von dem Blender die Segmente nicht speichern würde: es erst '
+        "lokal machen (Objekt > Beziehungen > Lokal machen)"
+    ),
+    '{count} faces of "{mesh}" keep {materials}: which material they had before is not known': (
+        '{count} Flächen von "{mesh}" behalten {materials}: welches Material sie vorher hatten, ist nicht bekannt'
+    ),
+    'The image "{name}" has been changed since it was baked, and stays': (
+        'Das Bild "{name}" wurde seit dem Backen geändert und bleibt'
+    ),
+    "You have changed these materials, they stay in the file: {names}": (
+        "Diese Materialien haben Sie geändert, sie bleiben in der Datei: {names}"
+    ),
     '"{name}" is in tweak mode: leave it first (Tab in the Nonlinear Animation editor)': '"{name}" ist im Tweak-Modus: ihn erst verlassen (Tab im Editor Nonlinear Animation)',
     "{names} no longer exists": "{names} gibt es nicht mehr",
     "{count} characters are selected ({names}): click the one whose poses are meant": "{count} Charaktere sind ausgewählt ({names}): den anklicken, dessen Posen gemeint sind",
@@ -161,6 +178,8 @@ GERMAN_MESSAGES = {
     "All {count} poses are the same: pose them differently": "Alle {count} Posen sind gleich: dem Charakter verschiedene Posen geben",
     # Meshes.
     '"{pose}": vertex {vertex} of "{object}" has a coordinate that is not finite ({count} such vertices)': '"{pose}": Vertex {vertex} von "{object}" hat eine Koordinate, die nicht endlich ist ({count} solche Vertices)',
+    "{names} has no faces, only points of a point cloud (a scan, Gaussian splats): make a mesh of them first": "{names} hat keine Flächen, nur Punkte einer Punktwolke (eines Scans, von Gaussian Splats): erst ein Mesh daraus machen",
+    '"{pose}": {count} triangles are over {times} times as long as most edges: is the skin torn there, or are there vertices that no bone moves?': '"{pose}": {count} Dreiecke sind über {times}-mal so lang wie die meisten Kanten: ist die Haut dort zerrissen, oder gibt es Vertices, die kein Knochen bewegt?',
     "{names} has no faces: there is no surface to find segments on": "{names} hat keine Flächen: da ist keine Oberfläche, auf der Segmente zu finden wären",
     "{names} has no faces: there is no surface to find segments on; if it consists of instances, add a Realize Instances node": "{names} hat keine Flächen: da ist keine Oberfläche, auf der Segmente zu finden wären; wenn es aus Instanzen besteht, einen Node Realize Instances hinzufügen",
     "Left out, as they do not move: {names}": "Weggelassen, da unbewegt: {names}",
@@ -309,5 +328,19 @@ GERMAN_MESSAGES = {
     "{path}: the folder {folder} does not exist": "{path}: den Ordner {folder} gibt es nicht",
     "{path}: this is a folder, give the name of a file": "{path}: das ist ein Ordner, den Namen einer Datei angeben",
     "{path}: unknown format to write; known are {formats}": "{path}: unbekanntes Format zum Schreiben; bekannt sind {formats}",
+    "{name} must be a list, not a single {type}: put it in square brackets": "{name} muss eine Liste sein, kein einzelnes {type}: in eckige Klammern setzen",
+    "There is nothing to clear: the segments of {names} are in another file: clear them there, or make it local first (Object > Relations)": "Hier ist nichts zu entfernen: die Segmente von {names} sind in einer anderen Datei: sie dort entfernen oder das Objekt erst lokal machen (Object > Relations)",
+    "{path}: it is a web page or another text in tags, not a 3D file: download the file itself": "{path}: das ist eine Webseite oder ein anderer Text mit Tags, keine 3D-Datei: die Datei selbst herunterladen",
+    "{path}: it is an archive: unpack it first": "{path}: das ist ein Archiv: es erst entpacken",
+    "{path}: it is no {suffix} file, whatever its name says: export or download it again": "{path}: das ist keine {suffix}-Datei, auch wenn sie so heißt: sie noch einmal exportieren oder herunterladen",
+    "{path}: the file is empty: export or download it again": "{path}: die Datei ist leer: sie noch einmal exportieren oder herunterladen",
+    '{path}: it is only a pointer of {maker} to the file: get the file itself with "{command}"': '{path}: das ist nur ein Verweis von {maker} auf die Datei: die Datei selbst mit "{command}" holen',
+    "{path}: a file that it needs is missing: {part}": "{path}: eine Datei fehlt, die sie braucht: {part}",
+    "{path}: there is no mesh in this file: Blender's importer found nothing in it, so it is empty or damaged": "{path}: in dieser Datei ist kein Mesh: Blenders Importer hat nichts darin gefunden, sie ist also leer oder beschädigt",
+    "{path}: Blender's importer of {suffix} files is turned off or missing in this Blender: enable its add-on": "{path}: Blenders Importer für {suffix}-Dateien ist abgeschaltet oder fehlt in diesem Blender: sein Add-on einschalten",
+    "{path}: its nodes contain each other in a circle: {nodes}": "{path}: ihre Knoten enthalten einander im Kreis: {nodes}",
+    "its parts contain each other in a circle, or are nested too deeply": "ihre Teile enthalten einander im Kreis oder sind zu tief verschachtelt",
+    "its importer failed ({error}), so it is damaged or of a kind that the importer does not know": "der Importer ist gescheitert ({error}), sie ist also beschädigt oder von einer Art, die er nicht kennt",
+    "{path} …: the name is too long: take at most {name} bytes, and {whole} with all folders": "{path} …: der Name ist zu lang: höchstens {name} Bytes nehmen, und {whole} mit allen Ordnern",
 }
 """By English template."""

@@ -1,0 +1,207 @@
+"""The materials of parts. One that the artist has changed, renamed or uses elsewhere is the artist's from then on."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..parts.palette import linear
+from ..parts.part_ids import default_name
+from ..parts.part_style import Style
+from ..scene.fingerprint import fingerprint, users_of
+from .ledger import has_ledger
+from .own_property import OwnProperty
+from .restore_point import is_removed, on_failure
+
+PART_PROPERTY = "wks_segment_component"
+"""Custom property of our materials: the part that they show."""
+TEMPLATE_PROPERTY = "wks_segment_template"
+"""Custom property of our materials that are copies: the name of the material that they were copied from."""
+OTHER_DEFAULTS = ("location", "location_absolute", "use_backface_culling_lightprobe_volume")
+"""Properties of new materials that are not the same in Blender 4.2 and 5.2; they do not change a look."""
+SAME_COLOR = 1e-5
+"""Largest difference of channels of a color that was set, as Blender rounds them to single precision."""
+_MADE = OwnProperty("wks_segment_made", "as")
+"""Custom property of our materials: name, color and fingerprint ("as") as made, in this version of Blender ("by")."""
+
+
+def part_of(material: bpy.types.Material | None) -> int | None:
+    """The part that a material of ours shows; None for a material of the artist."""
+    part = None if material is None else material.get(PART_PROPERTY)
+    return part if isinstance(part, int) else None
+
+
+def material_of_part(part: int, style: Style, template: bpy.types.Material | None) -> bpy.types.Material:
+    """The material of a part, the same one on all meshes. One that the artist has changed is taken as it is."""
+    source = "" if template is None else template.name
+    for material in bpy.data.materials:
+        is_ours = part_of(material) == part and material.library is None and not is_removed(material)
+        if is_ours and material.get(TEMPLATE_PROPERTY, "") == source:
+            return material
+    return _new_material(part, style, template)
+
+
+def restyle_material(material: bpy.types.Material, style: Style, name: bool, color: bool) -> None:
+    """Give a material of ours the name and the color of its part in a style.
+
+    A name or a color that the artist has chosen stays, and so does a material that is used elsewhere.
+    """
+    part = part_of(material)
+    if part is None or material.library is not None or not _is_ours_alone(material):
+        return
+    was_as_made, made = is_as_made(material), _made_of(material)
+    old_name, old_colors = material.name, [(place, tuple(getattr(*place))) for place in _color_places(material)]
+
+    def bring_back() -> None:
+        material.name = old_name
+        for place, value in old_colors:
+            setattr(*place, value)
+        _MADE.put(material, made)
+
+    on_failure(bring_back)
+    entries = dict(made)
+    if name and without_number(material.name) == without_number(made["name"]):
+        if without_number(material.name) != style.name_of(part):
+            material.name = style.name_of(part)
+        entries["name"] = material.name
+    if color:
+        entries["color"] = _color_of(part, style)
+        for place, value in old_colors:
+            if np.allclose(value, made["color"], atol=SAME_COLOR):
+                setattr(*place, entries["color"])
+    _MADE.put(material, entries)
+    if was_as_made:
+        _enter(material, entries["color"])
+
+
+def is_as_made(material: bpy.types.Material) -> bool:
+    """Whether a material of ours has the content and the name that it was made with."""
+    made = _made_of(material)
+    if made.get("by") == bpy.app.version_string:
+        return without_number(material.name) == without_number(made["name"]) and fingerprint(material) == made["as"]
+    return _is_like_new(material, made["name"])
+
+
+def keep_unused() -> list[str]:
+    """Let files keep those of our materials that nothing uses any more; give their names.
+
+    They are the artist's by now: all others are removed.
+    """
+    kept = unused()
+    for material in kept:
+        on_failure(lambda material=material: setattr(material, "use_fake_user", False))
+        material.use_fake_user = True
+    return [material.name for material in kept]
+
+
+def unused() -> list[bpy.types.Material]:
+    """Our materials that nothing uses, without those that will be removed."""
+    ours = [material for material in bpy.data.materials if part_of(material) is not None]
+    candidates = [material for material in ours if not (material.use_fake_user or is_removed(material))]
+    users = _users(*candidates)
+    return [material for material in candidates if not users[material]]
+
+
+def _users(*materials: bpy.types.Material) -> dict[bpy.types.ID, list[bpy.types.ID]]:
+    """What uses materials, other than meshes that will be removed, or that no object has, as joined objects leave."""
+    return {
+        material: [user for user in users if not (is_removed(user) or _is_left_over(user))]
+        for material, users in users_of(*materials).items()
+    }
+
+
+def _is_left_over(block: bpy.types.ID) -> bool:
+    return isinstance(block, bpy.types.Mesh) and block.users == 0
+
+
+def without_number(name: str) -> str:
+    """A name without the number that Blender adds to a name that is taken, as when something is appended."""
+    return re.sub(r"\.\d{3,}$", "", name)
+
+
+def _new_material(part: int, style: Style, template: bpy.types.Material | None) -> bpy.types.Material:
+    name = style.name_of(part)
+    if template is None:
+        material = bpy.data.materials.new(name)
+        if bpy.app.version < (5, 0, 0):  # always true since then, and setting it warns
+            material.use_nodes = True
+    else:
+        material = template.copy()
+        material.use_fake_user = False
+        material.name = name
+        material[TEMPLATE_PROPERTY] = template.name
+        if material.asset_data is not None:
+            material.asset_clear()
+    material[PART_PROPERTY] = part
+    color = _color_of(part, style)
+    _paint(material, color)
+    _enter(material, color)
+    return material
+
+
+def _color_of(part: int, style: Style) -> tuple[float, ...]:
+    return (*linear(style.colors_of(np.array([part]))[0]).tolist(), 1.0)
+
+
+def _paint(material: bpy.types.Material, color: tuple[float, ...]) -> None:
+    """Set the color in Solid view, and where the shader has a color of its own."""
+    for place in _color_places(material):
+        setattr(*place, color)
+
+
+def _enter(material: bpy.types.Material, color: tuple[float, ...]) -> None:
+    """Keep how the material is made."""
+    by = bpy.app.version_string
+    _MADE.put(material, {"name": material.name, "color": color, "as": fingerprint(material), "by": by})
+
+
+def _made_of(material: bpy.types.Material) -> dict[str, Any]:
+    """How a material was made, as far as files of older versions know."""
+    made, part = _MADE.of(material), part_of(material)
+    if made is not None:
+        return dict(made.to_dict())
+    assert part is not None
+    names = [default_name(part), *(scene.wks_segment.style().name_of(part) for scene in bpy.data.scenes)]
+    name = next((name for name in names if name == without_number(material.name)), names[0])
+    return {"name": name, "color": tuple(material.diffuse_color)}
+
+
+def _is_ours_alone(material: bpy.types.Material) -> bool:
+    """Whether only meshes with labels use a material."""
+    return all(isinstance(user, bpy.types.Mesh) and has_ledger(user) for user in _users(material)[material])
+
+
+def _is_like_new(material: bpy.types.Material, name: str) -> bool:
+    """Whether a material that another version has made is like one of this name that is made now."""
+    part = part_of(material)
+    if part is None or without_number(material.name) != without_number(name):
+        return False
+    template = bpy.data.materials.get(material.get(TEMPLATE_PROPERTY, ""))
+    new = _new_material(part, Style(), template)
+    _paint(new, tuple(material.diffuse_color))
+    try:
+        return fingerprint(new, ignored=OTHER_DEFAULTS) == fingerprint(material, ignored=OTHER_DEFAULTS)
+    finally:
+        bpy.data.materials.remove(new)
+
+
+def _color_places(material: bpy.types.Material) -> list[tuple[Any, str]]:
+    """What has a color of the part, and the name of the property."""
+    return [(material, "diffuse_color"), *((socket, "default_value") for socket in _color_sockets(material))]
+
+
+def _color_sockets(material: bpy.types.Material) -> list[bpy.types.NodeSocket]:
+    """Sockets where the color of a material is chosen: an open Base Color, or the RGB node that feeds one."""
+    sockets = []
+    for node in material.node_tree.nodes if material.node_tree is not None else []:
+        base = node.inputs.get("Base Color")
+        if base is None:
+            continue
+        if not base.is_linked:
+            sockets.append(base)
+        elif base.links[0].from_node.type == "RGB":
+            sockets.append(base.links[0].from_node.outputs[0])
+    return sockets
