@@ -314,7 +314,7 @@ def test_characters_have_an_image_each(settings):
 def test_every_pixel_of_a_real_character_has_the_color_of_its_face(command, tmp_path, name, unwrap):
     path, model = CHARACTERS / f"{name}.glb", tmp_path / "model.json"
     if not path.is_file():
-        pytest.skip(f"{path.name} is not in ../shared/data/characters")
+        pytest.skip(f"{path.name} is not here")
     quick = ("--frames", 2, "--eigenpairs", 60)
     assert command("learn", path, *quick, "--model", model).code == 0
     blend, output = tmp_path / "baked.blend", tmp_path / "map.png"

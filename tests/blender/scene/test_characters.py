@@ -13,7 +13,7 @@ CHARACTERS = Path(__file__).resolve().parents[4] / "shared" / "data" / "characte
 def test_real_character_is_segmented(command, tmp_path, name):
     path, output = CHARACTERS / f"{name}.glb", tmp_path / "out.blend"
     if not path.is_file():
-        pytest.skip(f"{path.name} is not in ../shared/data/characters")
+        pytest.skip(f"{path.name} is not here")
     done = command("segment", path, "--frames", 3, "--eigenpairs", 60, "--output", output, "--json")
     assert done.code == 0, done
     assert len(done.result["poses"]) == 3
