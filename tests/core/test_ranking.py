@@ -12,7 +12,7 @@ from wks_segment.core.learning.likelihood import left_out_likelihoods, likely_me
 from wks_segment.core.model_file import ModelFileError
 from wks_segment.core.ranking import least_usual, ranking_of, spread_evenly
 
-QUICK = {"n_segments": 3, "n_eigenpairs": 30, "n_energies": 20}
+QUICK = {"n_segments": 3, "n_eigenpairs": 30, "n_energies": 30}
 STRETCHED = np.array([1.0, 1.0, 4.0])
 
 

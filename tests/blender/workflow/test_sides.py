@@ -211,7 +211,10 @@ def test_loaded_model_gives_the_same_sides_on_another_pose_and_meshing(learned, 
     assert OPS.apply() == {"FINISHED"}
     assert sides_are_right(finer)
     for bone in (*ALONE, "foot.L", "paw.R"):
-        assert set(labels_of(finer)[polygons_at(finer, bone)]) == set(known[polygons_at(learned, bone)])
+        commonest = [np.bincount(labels).argmax() for labels in (
+            labels_of(finer)[polygons_at(finer, bone)], known[polygons_at(learned, bone)]
+        )]  # fmt: skip
+        assert commonest[0] == commonest[1]
 
 
 # Outputs
