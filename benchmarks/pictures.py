@@ -17,14 +17,16 @@ Shape = tuple[str, TriangleMesh, IntArray]
 
 
 def picture(shapes: Sequence[Shape], path: Path, columns: int = 4, y_is_up: bool = True) -> None:
-    """Render meshes of the same size in the colors of their labels, with captions; data sets mostly have y up."""
+    """Render meshes, each as large as its tile, in the colors of their labels; data sets mostly have y up."""
     from wks_segment.blender.render.contact_sheet import Tile, render_poses
     from wks_segment.blender.scene.poses import Pose
 
     tiles = []
     for name, mesh, labels in shapes:
         upright = mesh.vertices[:, [0, 2, 1]] * (1, -1, 1) if y_is_up else mesh.vertices
-        scaled = TriangleMesh(upright / np.ptp(mesh.vertices, axis=0).max(), mesh.faces)
-        pose = SimpleNamespace(mesh=scaled, polygon_of=np.arange(mesh.n_faces))
+        # Each mesh is a character of its own, which the sheet scales to its tile.
+        pose = SimpleNamespace(
+            mesh=TriangleMesh(upright, mesh.faces), polygon_of=np.arange(mesh.n_faces), character=len(tiles)
+        )
         tiles.append(Tile(cast(Pose, pose), labels, name))
     render_poses(tiles, path, columns)
