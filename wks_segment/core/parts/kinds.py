@@ -124,7 +124,6 @@ def find_kinds(
     for (evidence, signature), step in progress.each(list(zip(meshes, signatures, strict=True))):
         graph = PartGraph.of(evidence, signature, step)
         grow(graph, FINEST if len(meshes) == 1 else WHOLE, n_regions_of_mesh(n_segments))
-        graph.count_moving_together()
         graphs.append(graph)
     if len(meshes) == 1:
         kinds = [_repeats(meshes[0], signatures[0], graphs[0])]

@@ -38,11 +38,6 @@ VIEWERS = 2
 """Number of poses in which lines of sight are followed."""
 TINY = 1e-12
 """Least area, against a division by zero."""
-TOGETHER, STIFF_ANGLE, MOVING_ANGLE = 6.0, 0.1, 0.05
-"""Added to the log-odds by shape of two regions that do not turn apart, but turn against the rest of the body; by the
-second, in radians, the regions turn apart where it has fallen to a third, and by the third they turn against the rest
-where it has risen to two thirds. On 22 rigs bones stay whole to 0.85 of their area instead of 0.82; with 3 and 10 in
-place of 6 to 0.85."""
 
 
 @dataclass
@@ -72,8 +67,6 @@ class PartGraph:
         Log-odds that two neighbors are one part; −inf for regions that do not touch.
     mirrored : (n,) int array or None
         Mirror image of each patch; None if the mesh is not its own mirror image.
-    counts_moving_together : bool
-        Whether regions that turn together, against the rest of the body, are more likely one part.
     """
 
     patch: IntArray
@@ -89,7 +82,6 @@ class PartGraph:
     sights: FloatArray
     likeness: FloatArray
     mirrored: IntArray | None = None
-    counts_moving_together: bool = False
 
     @classmethod
     def of(cls, evidence: Evidence, signature: FloatArray, progress: Progress | None = None) -> PartGraph:
@@ -138,15 +130,6 @@ class PartGraph:
     def regions(self) -> IntArray:
         """Numbers of the regions that are left."""
         return np.flatnonzero(self.alive)
-
-    def count_moving_together(self) -> None:
-        """Count from here on that two regions move together: limbs stay whole when kinds are merged.
-
-        Not while regions grow, or parts that a few poses do not move against each other would be lost in one.
-        """
-        self.counts_moving_together = True
-        left = self.alive[:, None] & self.alive
-        self._measure(*np.nonzero(np.triu((self.lengths > 0) & left, 1)))
 
     def region_of_faces(self) -> IntArray:
         """(m,) region of each face."""
@@ -226,17 +209,8 @@ class PartGraph:
             + WEIGHT * np.log(np.maximum(weighted, 1e-6) / length)
         )
         turn = turns(self.correlations[first], self.correlations[second], areas[first], areas[second])
-        if self.counts_moving_together:
-            shape += TOGETHER * np.exp(-turn / STIFF_ANGLE) * self._share_of_moving(first, second)
         apart = TURN_WEIGHT * low**TURN_AREA * turn + np.exp(-shape / TURN_POWER)
         self.likeness[first, second] = self.likeness[second, first] = -TURN_POWER * np.log(apart)
-
-    def _share_of_moving(self, first: IntArray, second: IntArray) -> FloatArray:
-        """(k,) how much the two regions of each pair, taken together, turn against the rest: 0 for not at all, to 1."""
-        pairs, areas = self.correlations[first] + self.correlations[second], self.areas[first] + self.areas[second]
-        rest = self.correlations[self.alive].sum(axis=0) - pairs
-        turn = turns(pairs, rest, areas, np.maximum(1 - areas, TINY))
-        return np.asarray(1 - np.exp(-turn / MOVING_ANGLE))
 
 
 def _gains(cut: FloatArray, first: FloatArray, second: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
