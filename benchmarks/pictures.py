@@ -21,7 +21,7 @@ def picture(shapes: Sequence[Shape], path: Path, columns: int = 4, y_is_up: bool
     from wks_segment.blender.render.contact_sheet import Tile, render_poses
     from wks_segment.blender.scene.poses import Pose
 
-    tiles = []
+    tiles: list[Tile] = []
     for name, mesh, labels in shapes:
         upright = mesh.vertices[:, [0, 2, 1]] * (1, -1, 1) if y_is_up else mesh.vertices
         # Each mesh is a character of its own, which the sheet scales to its tile.
