@@ -204,7 +204,7 @@ def use_extension(site, zip_path, profile):
         poses.append(poses[0].copy())
         poses[-1].data = poses[0].data.copy()
         bpy.context.collection.objects.link(poses[-1])
-    for turn, pose in zip((0.0, 0.3, 0.6), poses, strict=True):
+    for turn, pose in zip((0.1, 0.3, 0.6), poses, strict=True):
         points = np.empty((len(pose.data.vertices), 3), dtype=np.float32)
         pose.data.vertices.foreach_get("co", points.ravel())
         angles = np.arctan2(points[:, 1], points[:, 0])
