@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,7 +109,7 @@ def mirrored_faces(mesh: TriangleMesh) -> IntArray | None:
 def _mirror(mesh: TriangleMesh) -> Mirror | None:
     """Mirror images of the faces of a mesh; None if it is not symmetric.
 
-    Of several planes it is the one that mirrors most of the area, the first of `_planes` if they are alike.
+    It is the first of `_planes` that mirrors the mesh as a whole, otherwise the one that mirrors most of its area.
     """
     centers, areas = mesh.face_centers, mesh.face_areas
     size = float(np.ptp(mesh.vertices[np.unique(mesh.faces)], axis=0).max())
@@ -123,7 +123,7 @@ def _mirror(mesh: TriangleMesh) -> Mirror | None:
     best, best_share = None, LEAST_SHARE
     some = slice(None, None, max(1, len(places) // SAMPLED_FACES))
     frame = Frame.of(mesh)
-    for plane in _planes(mesh, frame):
+    for plane in _planes(mesh, frame, places, tree):
         if np.average(np.abs(plane.distances(centers)), weights=areas) < OUTSIDE_PLANE * np.sqrt(mesh.area):
             continue
         near = _nearest(tree, plane.images(places[some]), tolerance)[0] < tolerance[some]
@@ -134,6 +134,8 @@ def _mirror(mesh: TriangleMesh) -> Mirror | None:
         share = float(areas[image >= 0].sum() / areas.sum())
         if share > best_share + 1e-6:
             best, best_share = (image, images, plane), share
+        if best_share >= EXACT_SHARE:
+            break
     if best is None:
         return None
     image, images, plane = best
@@ -162,7 +164,7 @@ class _Plane:
         return images
 
 
-def _planes(mesh: TriangleMesh, frame: Frame) -> list[_Plane]:
+def _planes(mesh: TriangleMesh, frame: Frame, places: FloatArray, tree: cKDTree) -> Iterator[_Plane]:
     """Planes that may be mirror planes of a mesh: across its coordinate axes, and across its own axes.
 
     The first lie in the middle of its extent. A mirror plane is perpendicular to one of the principal axes; where a
@@ -170,15 +172,14 @@ def _planes(mesh: TriangleMesh, frame: Frame) -> list[_Plane]:
     """
     corners = mesh.vertices[np.unique(mesh.faces)]
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
-    places = np.column_stack([mesh.face_centers, np.sqrt(mesh.face_areas)])
-    own = [_Plane(axis, float(axis @ frame.middle)) for axis in frame.axes.T]
-    return [_Plane(axis, float(axis @ middle)) for axis in np.eye(3)] + [_fitted(plane, places) for plane in own]
+    yield from (_Plane(axis, float(axis @ middle)) for axis in np.eye(3))
+    for axis in frame.axes.T:
+        yield _fitted(_Plane(axis, float(axis @ frame.middle)), places, tree)
 
 
-def _fitted(plane: _Plane, places: FloatArray) -> _Plane:
+def _fitted(plane: _Plane, places: FloatArray, tree: cKDTree) -> _Plane:
     """The plane, moved to the middle between faces and those nearest to their images, a few times."""
     some = places[:: max(1, len(places) // SAMPLED_FACES)]
-    tree = cKDTree(places)
     reach = FIT_REACH * float(np.ptp(places[:, :3], axis=0).max())
     for _ in range(FIT_ROUNDS):
         distance, nearest = tree.query(plane.images(some), distance_upper_bound=reach)
