@@ -103,15 +103,15 @@ def test_poses_vote_on_the_sides_of_a_mesh(model, monkeypatch):
 
 
 def test_some_of_many_poses_vote_on_sides(model):
-    poses = [figure(0.3, 0.1 * i, 3) for i in range(8)]
+    poses = [figure(0.3, 0.1 * i) for i in range(8)]
     polygons = [np.arange(poses[0].n_faces)] * 8
     labels, seen = model.segment_polygons(poses, polygons), []
     side = model.polygon_sides(poses, polygons, labels, seen.append)
     assert seen == sorted(seen)
     assert seen[-1] == pytest.approx(1.0)
     for one in ("arm", "leg"):
-        assert (side[limb(f"left {one}", 3)] == 1).all()
-        assert (side[limb(f"right {one}", 3)] == -1).all()
+        assert (side[limb(f"left {one}")] == 1).all()
+        assert (side[limb(f"right {one}")] == -1).all()
 
 
 def test_poses_with_different_triangles_vote_together(model):

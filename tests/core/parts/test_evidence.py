@@ -3,7 +3,7 @@ import pytest
 from shapes import figure, icosphere, split_at_every_corner, together
 
 from wks_segment.core import PoseSegmentation, TriangleMesh
-from wks_segment.core.parts.evidence import MOST_SHAPES, Evidence, tied_faces
+from wks_segment.core.parts.evidence import MOST_SHAPES, TIE_CURVATURE, Evidence, tied_faces
 from wks_segment.core.poses.pose_cache import Workpiece
 from wks_segment.core.progress import Progress
 
@@ -69,7 +69,7 @@ def test_islands_are_tied_by_faces_near_each_other():
     pairs = evidence.neighbors.pairs
     across = (pairs[:, 0] < half) != (pairs[:, 1] < half)
     assert across.any()
-    assert (evidence.curvature[across] == 0).all()
+    assert (evidence.curvature[across] == TIE_CURVATURE).all()
     assert (evidence.neighbors.lengths[across] > 0).all()
     ends = evidence.centers[pairs[across]]
     # The gap between the balls is half a radius wide.

@@ -7,7 +7,7 @@ from shapes import figure, icosphere, together
 from wks_segment.core import PoseSegmentation, TriangleMesh
 from wks_segment.core.parts.evidence import Evidence
 from wks_segment.core.parts.kinds import LEAST_REGION, grow
-from wks_segment.core.parts.part_graph import PartGraph
+from wks_segment.core.parts.part_graph import TOGETHER, PartGraph
 from wks_segment.core.poses.pose_cache import Workpiece
 from wks_segment.core.progress import Progress
 
@@ -128,13 +128,14 @@ def test_likeness_is_low_across_the_neck_of_a_dumbbell():
     assert np.median(likeness[place < 1.2]) < np.median(likeness[place > 1.6]) - 0.5
 
 
-def test_likeness_is_low_where_something_bends_and_as_before_elsewhere():
+def test_likeness_is_low_where_something_bends_and_high_where_it_moves_as_one():
     mesh = sausage()
     still, moving = graph_of(mesh, mesh), graph_of(mesh, sausage(1.0))
     place = places(still, mesh)
     lost = still.likeness[borders(still)] - moving.likeness[borders(still)]
     assert lost[place < 0.4].mean() > 1
-    assert np.abs(np.median(lost[place > 1.5])) < 0.3
+    # Half of the sausage turns apart from each end.
+    assert -0.7 * TOGETHER < np.median(lost[place > 1.5]) < -0.4 * TOGETHER
 
 
 def test_a_mesh_that_moves_as_a_whole_has_the_likeness_of_one_pose():
@@ -146,7 +147,7 @@ def test_a_mesh_that_moves_as_a_whole_has_the_likeness_of_one_pose():
 
 @pytest.mark.parametrize("seed", range(2))
 def test_the_order_of_faces_does_not_matter(seed):
-    mesh, posed = sausage(), sausage(0.7)
+    mesh, posed = sausage(0.2), sausage(0.7)
     order = np.random.default_rng(seed).permutation(mesh.n_faces)
     before = graph_of(mesh, posed)
     after = graph_of(*(TriangleMesh(pose.vertices, pose.faces[order]) for pose in (mesh, posed)))

@@ -40,7 +40,7 @@ from .parameters import effective, least_segments
 from .standardizer import Standardizer
 from .training_samples import TrainingSamples
 
-KINDS_VERSION = 4
+KINDS_VERSION = 5
 """To be raised whenever the same poses and settings give other kinds than before."""
 AXES, WHITENING, LEAST_VARIANCE = 20, 0.25, 1e-2
 """Number of principal axes of the signatures along which parts are compared, and the power of their variance, with a

@@ -25,6 +25,8 @@ from ..progress import Progress
 
 SHAPE_VERSION = 1
 """To be raised whenever the same pose has other creases or thickness than before."""
+TIE_CURVATURE = -6.0
+"""Curvature where islands are tied: they meet like parts in a crease, not like the halves of a flat sheet."""
 MOST_SHAPES = 5
 """Most poses whose creases and thickness are measured; more hardly change the means."""
 
@@ -44,7 +46,7 @@ class Evidence:
     neighbors : FaceAdjacency
         Faces that share an edge, then faces of islands that are tied; lengths for a surface of area 1.
     curvature : (p,) array
-        Across each border without small details, negative in a crease; 0 between islands.
+        Across each border without small details, negative in a crease and between islands.
     fine_curvature : (p,) array
         The same with small details.
     thickness : (m,) array
@@ -95,7 +97,7 @@ class Evidence:
         shared = [i for i, pose in enumerate(measured) if len(pose.neighbors.pairs) == len(first.neighbors.pairs)]
         mean = [np.mean([getattr(shapes[i], name) for i in shared], axis=0) for name in ("coarse", "fine")]
         pairs, lengths = tied_faces(first.surface)
-        none = np.zeros(len(pairs))
+        at_ties = np.full(len(pairs), TIE_CURVATURE)
         mirror = first.surface.mirror
         image = mirrored_faces(rest) if rest is not None else None if mirror is None else mirror.image
         at_rest = first.surface.original if rest is None else rest
@@ -109,8 +111,8 @@ class Evidence:
             np.mean([mesh.face_areas / mesh.area for mesh in originals], axis=0),
             at_rest.unit_face_centers,
             edges,
-            np.append(mean[0], none),
-            np.append(mean[1], none),
+            np.append(mean[0], at_ties),
+            np.append(mean[1], at_ties),
             np.mean([shape.thickness for shape in shapes], axis=0),
             image,
             order_of_faces(at_rest),

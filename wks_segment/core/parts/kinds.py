@@ -48,9 +48,11 @@ UNTOUCHED = 3.0
 SMALL_KIND = 0.01
 """Kinds below this share of the area are merged before all others: an eye goes before a head."""
 FIRST = 100.0
-"""Added to the log-odds of small kinds: more than any."""
-SMALL_FIRST = 1.0
-"""Weight of the logarithm of the smaller kind's area in the order of merges: fingers are merged before limbs."""
+"""Taken from the loss of small kinds: more than any."""
+DOUBT, SIZE = 4.0, 0.75
+"""A merge of kinds with log-odds o, of which the smaller one has the area a, is taken to lose `a ** SIZE * tanh(-o / 2
+/ DOUBT)`: what is mixed if they are two parts, less what is made whole if they are one. What loses least comes first, so
+fingers are merged before limbs."""
 
 
 @dataclass(frozen=True)
@@ -230,8 +232,9 @@ class _Merging:
                     table[i, j] = self._likeness(i, j)
         while len(left) > 1:
             smaller = np.minimum.outer(areas, areas)
-            rank = table + FIRST * (smaller < SMALL_KIND) - SMALL_FIRST * np.log(np.maximum(smaller, SMALL_KIND))
-            first, second = divmod(int(rank.argmax()), self._count)
+            loss = smaller**SIZE * np.tanh(-table / 2 / DOUBT) - FIRST * (smaller < SMALL_KIND)
+            loss[~np.isfinite(table)] = np.inf
+            first, second = divmod(int(loss.argmin()), self._count)
             if not np.isfinite(table[first, second]):
                 first, second = self._untouched(sorted(left), areas)
             kept, gone = (first, second) if areas[first] >= areas[second] else (second, first)

@@ -22,6 +22,8 @@ OWN_CHANGE = 0.5
 """Share of the squared angle by which the stiffer one of two regions deforms that does not count as their turn: soft
 bodies and shears turn the sides of a limb apart, and are no joints. With 0 and with 1 the bones of 22 rigs are
 less whole."""
+APART = 0.1
+"""Angle in radians by which two regions turn apart without doubt."""
 STILL = 1e-4
 """Angles below this count as 0: rounding must not decide between equal regions."""
 
@@ -80,6 +82,25 @@ def turns(first: FloatArray, second: FloatArray, first_area: FloatArray, second_
     deformed = [3 * np.maximum(1 - one / area, 0) for one, area in zip(alone, areas, strict=True)]
     angle = np.sqrt(np.maximum(1.5 * lost / reduced - OWN_CHANGE * np.minimum(*deformed), 0))
     return np.where(angle < STILL, 0.0, angle)
+
+
+def shares_turning(correlations: FloatArray, areas: FloatArray) -> FloatArray:
+    """(r,) share of the area that turns apart from each region between poses: 0 where nothing moves, or for one pose.
+
+    Parameters
+    ----------
+    correlations : (r, q, 3, 3) array
+        `edge_correlations` of the regions.
+    areas : (r,) array
+    """
+    if not correlations.shape[1]:
+        return np.zeros(len(correlations))
+    left, _, right = np.linalg.svd(correlations)
+    left[..., 2] *= np.sign(np.linalg.det(left) * np.linalg.det(right))[..., None]
+    rotations = left @ right
+    cosines = np.clip((np.einsum("aqij,bqij->abq", rotations, rotations) - 1) / 2, -1, 1)
+    angles = np.sqrt((np.arccos(cosines) ** 2).mean(axis=2))
+    return np.asarray((1 - np.exp(-angles / APART)) @ areas / areas.sum())
 
 
 def _explained(correlations: FloatArray) -> FloatArray:

@@ -20,7 +20,7 @@ from ..mesh.mirror import is_exact
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ..progress import Progress
 from .evidence import Evidence
-from .motion import edge_correlations, turns
+from .motion import APART, edge_correlations, shares_turning, turns
 from .patches import patches_of
 from .visibility import visible
 
@@ -34,6 +34,9 @@ TURN_WEIGHT, TURN_AREA, TURN_POWER = 49.0, 1 / 3, 1.5
 """With a turn by t radians between two regions, the smaller of area a, and odds o by shape, the odds that they are
 one part are `(TURN_WEIGHT * a ** TURN_AREA * t + o ** (-1 / TURN_POWER)) ** -TURN_POWER`. On eleven rigs the odds fall
 with the power 1.5 of the turn and 0.5 of the area; the weight is the best of four on 22 rigs."""
+TOGETHER = 4.0
+"""Log-odds added for two regions that do not turn apart, times the share of the area that turns apart from both: who
+moves as one while all others move is one part."""
 VIEWERS = 2
 """Number of poses in which lines of sight are followed."""
 TINY = 1e-12
@@ -57,6 +60,8 @@ class PartGraph:
         Sum over the faces of area times log thickness.
     correlations : (n, q, 3, 3) array
         See `edge_correlations`.
+    turning : (n,) array
+        Sum over the faces of area times the share of the whole area that turns apart from them.
     signatures : (n, d) array
         Sum over the faces of area times signature, in any space.
     lengths, weighted, concavities : (n, n) arrays
@@ -75,6 +80,7 @@ class PartGraph:
     areas: FloatArray
     thickness: FloatArray
     correlations: FloatArray
+    turning: FloatArray
     signatures: FloatArray
     lengths: FloatArray
     weighted: FloatArray
@@ -105,13 +111,15 @@ class PartGraph:
         viewers = evidence.poses[:VIEWERS]
         seen = np.mean([visible(pose, middle, step) for pose, step in Progress.of(progress).each(viewers)], axis=0)
         meshes = [pose.surface.original for pose in evidence.poses]
+        correlations = edge_correlations(meshes, patch)
         graph = cls(
             patch,
             np.arange(count),
             np.ones(count, dtype=bool),
             patch_areas,
             np.bincount(patch, areas * evidence.thickness, count).astype(np.float64),
-            edge_correlations(meshes, patch),
+            correlations,
+            shares_turning(correlations, patch_areas) * patch_areas,
             np.stack([np.bincount(patch, areas * column, count) for column in signature.T], axis=1),
             table(neighbors.lengths),
             table(neighbors.lengths * weight),
@@ -152,7 +160,7 @@ class PartGraph:
             merge_in_table(table, kept, gone)
             table[kept, kept] = 0
         merge_in_table(self.sights, kept, gone)
-        for sums in (self.areas, self.thickness, self.correlations, self.signatures):
+        for sums in (self.areas, self.thickness, self.correlations, self.turning, self.signatures):
             sums[kept] += sums[gone]
         self.areas[gone] = TINY
         self.alive[gone] = False
@@ -180,7 +188,7 @@ class PartGraph:
 
     def _share_evidence(self, mirrored: IntArray) -> None:
         """Give mirrored regions the same evidence, given the (n,) mirror image of each patch."""
-        for sums in (self.areas, self.thickness, self.signatures):
+        for sums in (self.areas, self.thickness, self.turning, self.signatures):
             sums += sums[mirrored]
             sums /= 2
         for table in (self.lengths, self.weighted, self.concavities, self.sights):
@@ -210,7 +218,9 @@ class PartGraph:
         )
         turn = turns(self.correlations[first], self.correlations[second], areas[first], areas[second])
         apart = TURN_WEIGHT * low**TURN_AREA * turn + np.exp(-shape / TURN_POWER)
-        self.likeness[first, second] = self.likeness[second, first] = -TURN_POWER * np.log(apart)
+        turning = self.turning / areas
+        together = TOGETHER * np.minimum(turning[first], turning[second]) * np.exp(-turn / APART)
+        self.likeness[first, second] = self.likeness[second, first] = together - TURN_POWER * np.log(apart)
 
 
 def _gains(cut: FloatArray, first: FloatArray, second: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
