@@ -34,9 +34,10 @@ TURN_WEIGHT, TURN_AREA, TURN_POWER = 49.0, 1 / 3, 1.5
 """With a turn by t radians between two regions, the smaller of area a, and odds o by shape, the odds that they are
 one part are `(TURN_WEIGHT * a ** TURN_AREA * t + o ** (-1 / TURN_POWER)) ** -TURN_POWER`. On eleven rigs the odds fall
 with the power 1.5 of the turn and 0.5 of the area; the weight is the best of four on 22 rigs."""
-TOGETHER = 4.0
-"""Log-odds added for two regions that do not turn apart, times the share of the area that turns apart from both: who
-moves as one while all others move is one part."""
+TOGETHER, CHANCES = 1.0, 4
+"""Log-odds added for two regions that do not turn apart, for each pose after the first, up to a number of poses, times
+the share of the area that turns apart from both: what moves as one again and again while other places move is one
+part."""
 VIEWERS = 2
 """Number of poses in which lines of sight are followed."""
 TINY = 1e-12
@@ -61,7 +62,8 @@ class PartGraph:
     correlations : (n, q, 3, 3) array
         See `edge_correlations`.
     turning : (n,) array
-        Sum over the faces of area times the share of the whole area that turns apart from them.
+        Sum over the faces of area times the share of the whole area that turns apart from them, times the number of
+        poses after the first, up to `CHANCES`.
     signatures : (n, d) array
         Sum over the faces of area times signature, in any space.
     lengths, weighted, concavities : (n, n) arrays
@@ -119,7 +121,7 @@ class PartGraph:
             patch_areas,
             np.bincount(patch, areas * evidence.thickness, count).astype(np.float64),
             correlations,
-            shares_turning(correlations, patch_areas) * patch_areas,
+            min(len(meshes) - 1, CHANCES) * shares_turning(correlations, patch_areas) * patch_areas,
             np.stack([np.bincount(patch, areas * column, count) for column in signature.T], axis=1),
             table(neighbors.lengths),
             table(neighbors.lengths * weight),
