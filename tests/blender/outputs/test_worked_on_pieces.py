@@ -11,7 +11,7 @@ from wks_segment.blender.outputs.options import OutputOptions
 
 pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
-KEPT = "1 separated objects have changed since and are kept"
+KEPT = 'You have changed these separated objects, they stay: "{}"'
 
 
 @pytest.fixture
@@ -141,7 +141,7 @@ def test_a_piece_that_was_worked_on_stays(pieces, printed, work):
     OPS.clear()
     assert name in bpy.data.objects
     assert bpy.data.objects[name].data == mesh
-    assert KEPT in printed().out
+    assert KEPT.format(name) in printed().out
     kept = {name, "Limbed", "Mine", "Shares"}
     assert set(bpy.data.objects.keys()) <= kept, "pieces without work are removed"
 

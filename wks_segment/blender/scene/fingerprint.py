@@ -20,7 +20,7 @@ CHANGING_BY_THEMSELVES = frozenset({
     # Kept by Blender for itself, other from session to session.
     "rna_type", "original", "users", "use_extra_user", "tag", "session_uid", "preview", "library",
     "library_weak_reference", "override_library", "is_valid", "texture_paint_images", "texture_paint_slots",
-    "paint_active_slot", "paint_clone_slot", "from", "id_root",
+    "paint_active_slot", "paint_clone_slot", "from", "id_root", "storage_type",
     # Computed from other properties.
     "name_full", "dimensions", "matrix_world", "matrix_local", "matrix_basis", "bound_box", "loop_triangles",
     "loop_triangle_polygons", "vertex_normals", "polygon_normals", "corner_normals", "color_attributes",
@@ -166,6 +166,8 @@ def _array(items: Any) -> Iterator[str | bytes]:
             continue
         if prop.is_readonly and not isinstance(items[0], bpy.types.MeshPolygon | bpy.types.MeshLoop):
             continue
+        if isinstance(items[0], bpy.types.MeshPolygon) and prop.identifier == "vertices":
+            continue  # as many as the polygon has, which cannot be read at once; its loops have them
         numbers = read_numbers(items, prop)
         if numbers is not None:
             yield prop.identifier

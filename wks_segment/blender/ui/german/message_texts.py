@@ -22,7 +22,7 @@ GERMAN_MESSAGES = {
     "From {names}": "Aus {names}",
     "Certainty by segments: {curve} ({number} taken)": "Sicherheit nach Segmenten: {curve} ({number} genommen)",
     "Cleared the segments of 1 mesh": "Segmente von 1 Mesh entfernt",
-    "{count} separated objects have changed since and are kept": "{count} getrennte Objekte wurden seither geändert und bleiben",
+    "You have changed these separated objects, they stay: {names}": "Diese getrennten Objekte wurden geändert und bleiben: {names}",
     "Transferred to 1 object": "Auf 1 Objekt übertragen",
     "Unwrapped 1 mesh by segments": "1 Mesh nach Segmenten abgewickelt",
     "Separated into {count} objects": "In {count} Objekte getrennt",
