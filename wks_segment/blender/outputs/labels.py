@@ -49,6 +49,7 @@ LASTING_OUTPUTS: tuple[LastingOutput, ...] = (UvMap(), IdMapImage(), ByHand())
 def write_labels(
     mesh: bpy.types.Mesh, labels: IntArray, options: OutputOptions = DEFAULT_OUTPUTS,
     merged_into: Mapping[int, int] = NOTHING_MERGED, weights: Mapping[int, FloatArray] | None = None,
+    warnings: list[str] | None = None,
 ) -> IntArray:  # fmt: skip
     """Write the parts of polygons to a mesh with a person's changes, in place of what was written before.
 
@@ -63,6 +64,8 @@ def write_labels(
     weights
         (n,) weights of the model's parts, for soft vertex groups; they follow the changes. Without them the groups are
         hard, if the options ask for groups.
+    warnings
+        Gets what was not taken back of the labels before, and why.
 
     Returns
     -------
@@ -86,10 +89,12 @@ def write_labels(
         output.write(mesh, parts, ledger)
     keep_unused()
     mesh.update()
+    if warnings is not None:
+        warnings += ledger.warnings
     return final
 
 
-def rewrite_labels(mesh: bpy.types.Mesh, style: Style, merged_into: Mapping[int, int]) -> None:
+def rewrite_labels(mesh: bpy.types.Mesh, style: Style, merged_into: Mapping[int, int], warnings: list[str]) -> None:
     """Write the labels of a mesh again, with all outputs that it has, after a person's changes."""
     labels, before = model_labels(mesh), labels_on(mesh)
     if labels is None or before is None:
@@ -112,7 +117,7 @@ def rewrite_labels(mesh: bpy.types.Mesh, style: Style, merged_into: Mapping[int,
         seams="seams" in ledger,
         style=style,
     )
-    write_labels(mesh, labels, options, merged_into, weights)
+    write_labels(mesh, labels, options, merged_into, weights, warnings)
 
 
 def clear_labels(mesh: bpy.types.Mesh, warnings: list[str] | None = None) -> bool:

@@ -94,13 +94,21 @@ def activate(settings: WKSSegmentSettings, part: int) -> None:
         settings.active_segment = numbers.index(part)
 
 
-def rewrite_all(settings: WKSSegmentSettings, objects: list[bpy.types.Object] | None = None) -> None:
-    """Write the labels of objects (None: of all in the scene) again with the user's current edits, and list them."""
+def rewrite_all(settings: WKSSegmentSettings, objects: list[bpy.types.Object] | None = None) -> list[str]:
+    """Write the labels of objects (None: of all in the scene) again with the user's current edits, and list them.
+
+    Returns
+    -------
+    list of str
+        What was not taken back of the labels before, and why.
+    """
+    warnings: list[str] = []
     notes, written = settings.notes(), labeled(settings, everywhere=True) if objects is None else objects
     with followed(written):
         for mesh in meshes_of(written):
-            rewrite_labels(mesh, settings.style(), notes.joined)
+            rewrite_labels(mesh, settings.style(), notes.joined, warnings)
     fill(settings)
+    return warnings
 
 
 def rename(settings: WKSSegmentSettings, part: int, name: str) -> None:
