@@ -116,6 +116,22 @@ def test_joined_labels_are_written_again(settings):
     assert sorted(obj.vertex_groups.keys()) == ["Of A", "Of B"]
 
 
+@pytest.mark.parametrize("active", [0, 5])
+def test_joined_labels_are_listed_and_edited(settings, active):
+    """Also where the object that the others were joined with had none."""
+    obj = joined(character("A", SKIN, active), character("B", METAL, 5))
+    select(obj)
+    OPS.refresh_segments()
+    assert [item.number for item in settings.segments] == [0, 1, 2, 3, 4]
+    assert OPS.merge_segments(into=1) == {"FINISHED"}
+    assert [item.number for item in settings.segments] == [1, 2, 3, 4]
+    slots = [material.name for material in obj.data.materials if material.name.startswith("Segment")]
+    assert slots == ["Segment 2", "Segment 3", "Segment 4", "Segment 5"]
+    OPS.clear()
+    assert [material.name for material in obj.data.materials] == [*SKIN, *METAL]
+    assert sorted(obj.vertex_groups.keys()) == ["Of A", "Of B"]
+
+
 def test_a_renamed_material_of_a_joined_object_is_given_back(settings):
     first, second = character("A", SKIN, 3), character("B", METAL, 5)
     bpy.data.materials["Metal"].name = "Steel"

@@ -96,6 +96,7 @@ def write_labels(
 
 def rewrite_labels(mesh: bpy.types.Mesh, style: Style, merged_into: Mapping[int, int], warnings: list[str]) -> None:
     """Write the labels of a mesh again, with all outputs that it has, after a person's changes."""
+    adopt(mesh)
     labels, before = model_labels(mesh), labels_on(mesh)
     if labels is None or before is None:
         return
@@ -110,10 +111,10 @@ def rewrite_labels(mesh: bpy.types.Mesh, style: Style, merged_into: Mapping[int,
             weights, vertex_groups = move_weights(mesh, weights, before, labels), "soft"
     options = OutputOptions(
         colors="colors" in ledger,
-        materials="first_slot" in ledger,
+        materials="first_slot" in ledger or "own_materials" in ledger,
         template=template_on(mesh),
         vertex_groups=vertex_groups,
-        face_sets="face_sets" in ledger,
+        face_sets="face_sets" in ledger or "own_face_sets" in ledger,
         seams="seams" in ledger,
         style=style,
     )
