@@ -104,6 +104,46 @@ def test_clear_after_a_join(tmp_path, join, reopened):
     assert not [name for name in bpy.data.materials.keys() if name.startswith("Segment")]  # noqa: SIM118
 
 
+def in_face_sets(name, had_sets, parts, options):
+    obj = limbed(name, subdivisions=2)
+    if had_sets:
+        sets = 1 + np.arange(len(obj.data.polygons), dtype=np.int32) // 10
+        obj.data.attributes.new(FACE_SETS, "INT", "FACE").data.foreach_set("value", sets)
+    if parts:
+        write_labels(obj.data, stripes(obj.data, parts), options)
+    return obj
+
+
+def borders_of_sets(obj):
+    """Which faces are in the same set; none are if there are no sets."""
+    if FACE_SETS not in obj.data.attributes:
+        return None
+    sets = numbers(obj.data, FACE_SETS)
+    return np.equal.outer(sets, sets)
+
+
+STATES = [
+    (had_sets, parts, OutputOptions(face_sets=writes))
+    for had_sets in (False, True)
+    for parts, writes in ((0, False), (3, False), (5, True))
+]
+
+
+@pytest.mark.parametrize("second", STATES, ids=lambda state: f"sets {state[0]}, {state[1]} parts")
+@pytest.mark.parametrize("first", STATES, ids=lambda state: f"sets {state[0]}, {state[1]} parts")
+def test_face_sets_after_a_join(first, second):
+    """As if the objects had been joined without segments."""
+    expected = borders_of_sets(
+        joined(*(in_face_sets(str(i), had, 0, None) for i, (had, _, _) in enumerate((first, second))))
+    )
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    obj = joined(*(in_face_sets(str(i), *each) for i, each in enumerate((first, second))))
+    if first[1] or second[1]:
+        select(obj)
+        OPS.clear()
+    np.testing.assert_array_equal(borders_of_sets(obj), expected)
+
+
 def test_joined_labels_are_written_again(settings):
     """Apply and the like begin with what is there."""
     obj = joined(character("A", SKIN, 3), character("B", METAL, 5))
