@@ -144,6 +144,29 @@ def test_face_sets_after_a_join(first, second):
     np.testing.assert_array_equal(borders_of_sets(obj), expected)
 
 
+@pytest.mark.parametrize("steps", ["clear", "reopen, clear", "write, clear", "write, reopen, clear"])
+@pytest.mark.parametrize("active", [0, 3])
+def test_id_maps_of_joined_objects(settings, tmp_path, active, steps):
+    settings.bake_size, settings.bake_unwrap = 64, True
+    first, second, other = (character(name, SKIN, parts) for name, parts in (("A", active), ("B", 5), ("C", 4)))
+    for obj in (first, second, other):
+        select(obj)
+        if obj != first or active:
+            OPS.bake()
+    joined(first, second)
+    for step in steps.split(", "):
+        if step == "reopen":
+            bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "joined.blend"))
+            bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "joined.blend"))
+        select(bpy.data.objects["A"])
+        if step == "write":
+            write_labels(bpy.context.object.data, stripes(bpy.context.object.data), OutputOptions())
+            assert "B ID Map" in bpy.data.images
+        if step == "clear":
+            OPS.clear()
+    assert [image.name for image in bpy.data.images] == ["C ID Map"]
+
+
 def test_joined_labels_are_written_again(settings):
     """Apply and the like begin with what is there."""
     obj = joined(character("A", SKIN, 3), character("B", METAL, 5))
