@@ -9,12 +9,12 @@ ARTIST = "Velvet"
 @pytest.fixture
 def learned(window):
     """The window after learning from two poses."""
+    window.select(BODY)
     learn(window, BODY)
     return window
 
 
 def learn(window, name):
-    window.select(name)
     window.open_sidebar()
     window.enter("pose_count", "2")
     window.press("wks_segment.learn")
@@ -89,17 +89,14 @@ def test_the_larger_of_two_characters_is_learned_unless_the_other_is_active(pair
     pair.over_viewport()
     pair.key("a")
     pair.ask("make_active", "Ground")
-    pair.open_sidebar()
-    pair.enter("pose_count", "2")
-    pair.press("wks_segment.learn")
-    pair.wait_for("segments", BODY)
-    pair.wait_for("job_is_over")
+    learn(pair, BODY)
     told = "\n".join(pair.ask("state")["summary"])
     assert told.startswith(f"From {BODY}")
     assert 'do not move: "Ground"' in told
     assert 'Several characters move: "Calf", "Creature"' in told
     assert pair.ask("segments", "Calf") == pair.ask("segments", "Ground") == {}
     shot("the larger one")
+    pair.ask("make_active", "Calf")
     learn(pair, "Calf")
     assert pair.ask("state")["summary"][0] == "From Calf"
     assert len(pair.ask("segments", "Calf")) == 8

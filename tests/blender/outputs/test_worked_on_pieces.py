@@ -26,7 +26,7 @@ def pieces(settings):
     obj.shape_key_add(name="Thin")
     obj.modifiers.new("Sub", "SUBSURF").levels = 0
     obj["export"], obj["is_body"] = "body", True
-    obj.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    obj.modifiers.new("Hair", "PARTICLE_SYSTEM").particle_system.settings.type = "HAIR"
     obj.modifiers.new("Nodes", "NODES").node_group = node_group()
     write_labels(obj.data, stripes(obj.data), OutputOptions(materials=True, vertex_groups="hard", seams=True))
     select(obj)

@@ -15,6 +15,7 @@ from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ...core.message import Message
 from ..parts.part_style import Style
 from ..scene.characters import quoted
+from ..scene.simulations import check_may_change
 from ..scene.vertex_group_access import active_group
 from .color_attribute import ColorAttribute
 from .face_sets import FaceSets
@@ -72,6 +73,7 @@ def write_labels(
     (p,) int array
         The parts as they were written.
     """
+    check_may_change(mesh)
     adopt(mesh)
     given = by_hand(mesh)
     final = merge_parts(np.where(given < 0, labels, given), merged_into)
@@ -96,6 +98,7 @@ def write_labels(
 
 def rewrite_labels(mesh: bpy.types.Mesh, style: Style, merged_into: Mapping[int, int], warnings: list[str]) -> None:
     """Write the labels of a mesh again, with all outputs that it has, after a person's changes."""
+    check_may_change(mesh)
     adopt(mesh)
     labels, before = model_labels(mesh), labels_on(mesh)
     if labels is None or before is None:
@@ -131,6 +134,7 @@ def clear_labels(mesh: bpy.types.Mesh, warnings: list[str] | None = None) -> boo
     """
     if not has_labels(mesh):
         return False
+    check_may_change(mesh)
     adopt(mesh)
     ledger = Ledger(mesh)
     for output in reversed((*OUTPUTS, *LASTING_OUTPUTS)):

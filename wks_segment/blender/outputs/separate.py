@@ -15,6 +15,7 @@ from ...core.mesh.triangle_mesh import BoolArray, IntArray
 from ..parts import part_ids
 from ..parts.part_style import Style
 from ..scene.fingerprint import Label, fingerprint, is_made_as, label_of, made_as, users_of
+from ..scene.simulations import check_may_change
 from .ledger import Ledger
 from .own_property import OwnProperty
 from .part_attributes import labels_on
@@ -35,6 +36,7 @@ def separate(
     A separated object has the parent of the original, or else the original as its parent, and has its collections,
     modifiers, materials, vertex groups, shape keys and UV maps.
     """
+    check_may_change(obj.data)
     separated = [_make(obj, labels, part, style) for part in part_ids.unique_parts(labels)]
     _enter(obj, separated)
     on_failure(lambda: _ORIGINAL.delete(obj))

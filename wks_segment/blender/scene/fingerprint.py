@@ -40,7 +40,7 @@ OUR_PREFIX = "wks_segment"
 """What the names of all our custom properties start with."""
 DEEPEST = 40
 """Levels of properties within properties; Blender's own have fewer than ten."""
-SESSION = uuid4().hex
+THIS_SESSION = uuid4().hex
 """Tells this session of Blender from others."""
 Label: TypeAlias = Callable[[bpy.types.ID], str]
 
@@ -64,12 +64,12 @@ def made_as(hash_with: Callable[[Label], str]) -> dict[str, str]:
         Gives a hash of it, in which other data-blocks have a label.
     """
     hashes = {"as": hash_with(label_of), "here": hash_with(label_here)}
-    return {**hashes, "session": SESSION, "by": bpy.app.version_string}
+    return {**hashes, "session": THIS_SESSION, "by": bpy.app.version_string}
 
 
 def is_made_as(made: Mapping[str, Any], hash_with: Callable[[Label], str]) -> bool:
     """Whether something is as it was made, by this version of Blender; what it uses may have other names by now."""
-    here = made.get("session") == SESSION and made["here"] == hash_with(label_here)
+    here = made.get("session") == THIS_SESSION and made["here"] == hash_with(label_here)
     return here or bool(made["as"] == hash_with(label_of))
 
 

@@ -24,6 +24,7 @@ from ..parts.palette import most_different
 from ..props.settings import WKSSegmentSettings
 from ..scene.attributes import read_bools, read_floats
 from ..scene.characters import Character, mesh_objects, polygon_ranges, with_rigged
+from ..scene.simulations import may_change
 from .all_or_nothing import all_or_nothing
 
 SUCCESSOR_OVERLAP = 0.5
@@ -145,8 +146,9 @@ def restyle(settings: WKSSegmentSettings, part: int, name: bool = True, color: b
     """Write the current name or color of a part wherever it is written already."""
     style, objects = settings.style(), labeled(settings, everywhere=True)
     with leaving_edit_mode(bpy.context) if color else nullcontext(), followed(objects):
-        # A mesh can be in Edit Mode in another window.
-        for mesh in (mesh for mesh in meshes_of(objects) if not mesh.is_editmode or not color):
+        # A mesh can be in Edit Mode in another window; one whose simulation is not baked follows with its next labels.
+        meshes = [mesh for mesh in meshes_of(objects) if may_change(mesh)]
+        for mesh in (mesh for mesh in meshes if not mesh.is_editmode or not color):
             if name:
                 rename_group(mesh, part, style)
             if color:
