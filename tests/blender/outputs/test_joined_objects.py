@@ -107,7 +107,9 @@ def test_clear_after_a_join(tmp_path, join, reopened):
 def in_face_sets(name, had_sets, parts, options):
     obj = limbed(name, subdivisions=2)
     if had_sets:
-        sets = 1 + np.arange(len(obj.data.polygons), dtype=np.int32) // 10
+        # Blender 4.2 joins more than five into others of the same object.
+        size = 10 if bpy.app.version >= (5, 0, 0) else 20
+        sets = 1 + np.arange(len(obj.data.polygons), dtype=np.int32) // size
         obj.data.attributes.new(FACE_SETS, "INT", "FACE").data.foreach_set("value", sets)
     if parts:
         write_labels(obj.data, stripes(obj.data, parts), options)

@@ -103,8 +103,9 @@ def _in_our_sets(
     if labels is None or written is None or (written[faces] == NOT_WRITTEN).any():
         return np.zeros_like(faces)
     wanted = labels + FIRST_FACE_SET
+    if own is None or (own[faces] == NO_FACE_SET).all():
+        # All of a part are in one set, or they were not written as face sets. Blender 4.2 does not add the same to all.
+        pairs = np.unique(np.stack([wanted, now], axis=1)[faces], axis=0)
+        return faces if len(pairs) == len(np.unique(pairs[:, 0])) else np.zeros_like(faces)
     added, count = np.unique((now - wanted)[faces], return_counts=True)
-    had_sets = own is not None and bool((own[faces] != NO_FACE_SET).any())
-    if len(added) > 1 and not had_sets:  # not written as face sets
-        return np.zeros_like(faces)
     return np.asarray(faces & np.isin(now - added[count.argmax()], wanted[faces]))

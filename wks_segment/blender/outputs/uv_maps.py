@@ -7,7 +7,6 @@ import bpy
 from ...core.mesh.triangle_mesh import FloatArray
 from ..errors import UserError
 from ..scene.attributes import write_floats
-from ..scene.simulations import check_may_change
 from ..scene.vertex_group_access import free_name
 from .ledger import Ledger
 
@@ -39,7 +38,6 @@ class UvMap:
 
 def write_uv_map(mesh: bpy.types.Mesh, uvs: FloatArray) -> None:
     """Write (corners, 2) UVs to our UV map, which is added if it is not there, and make it the active one."""
-    check_may_change(mesh)
     ledger = Ledger(mesh)
     layer = mesh.uv_layers.get(ledger.get("uv_map", ""))
     if layer is None:
