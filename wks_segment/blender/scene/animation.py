@@ -123,7 +123,7 @@ def _one_of(
     largest = max(characters, key=area)
     note = Message(
         'Several characters move: {names}. "{name}" is taken, which has the largest moving surface; make another one '
-        "active, or name it by --object, to take that",
+        "active (on the command line: --object) to take that",
         names=quoted(character.name for character in characters), name=largest.name,
     )  # fmt: skip
     return [largest], [note]

@@ -184,7 +184,7 @@ GERMAN_MESSAGES = {
     "{names} has no faces: there is no surface to find segments on; if it consists of instances, add a Realize Instances node": "{names} hat keine Flächen: da ist keine Oberfläche, auf der Segmente zu finden wären; wenn es aus Instanzen besteht, einen Node Realize Instances hinzufügen",
     "Left out, as they do not move: {names}": "Weggelassen, da unbewegt: {names}",
     "Taken as one character, as they touch: {names}": "Als ein Charakter genommen, da sie sich berühren: {names}",
-    'Several characters move: {names}. "{name}" is taken, which has the largest moving surface; make another one active, or name it by --object, to take that': 'Mehrere Charaktere bewegen sich: {names}. Genommen wird "{name}" mit der größten bewegten Oberfläche; um einen anderen zu nehmen, ihn aktiv machen oder mit --object nennen',
+    'Several characters move: {names}. "{name}" is taken, which has the largest moving surface; make another one active (on the command line: --object) to take that': 'Mehrere Charaktere bewegen sich: {names}. Genommen wird "{name}" mit der größten bewegten Oberfläche; um einen anderen zu nehmen, ihn aktiv machen (auf der Befehlszeile: --object)',
     '"{name}": the poses are from its animation as it is; actions in this file: {others}': '"{name}": die Posen sind aus der Animation, wie sie ist; Aktionen in dieser Datei: {others}',
     '"{name}": the poses are from the action "{action}"; others: {others}': '"{name}": die Posen sind aus der Aktion "{action}"; andere: {others}',
     '"{name}": number of different poses is {different}, not {asked}: its animation has no more in these frames': '"{name}": Zahl der verschiedenen Posen ist {different}, nicht {asked}: die Animation hat in diesen Frames nicht mehr',
