@@ -6,17 +6,22 @@ import json
 import os
 import sys
 import traceback
+from types import FrameType
+from typing import NoReturn
+
+from .interruption import Interrupted, handled
 
 
 def main() -> None:
     """Run the command line and end the process with its exit code."""
     try:
-        import bpy  # noqa: F401
+        with handled(_interrupted_at_start):
+            import bpy  # noqa: F401
 
-        from . import blender
-        from .blender.cli.main import run
+            from . import blender
+            from .blender.cli.main import run
 
-        blender.register()
+            blender.register()
         code = run(sys.argv[1:])
         blender.unregister()
     except SystemExit as end:  # argparse, after the help
@@ -36,10 +41,21 @@ def _failed_to_start(error: BaseException) -> int:
     else:
         traceback.print_exc()
         reason = f"unexpected error, please report it: {type(error).__name__}: {error}"
-    print(f"wks_segment: {reason}", file=sys.stderr)
-    if "--json" in sys.argv:
-        print(json.dumps({"error": reason}))
+    _tell(reason)
     return 1
+
+
+def _interrupted_at_start(number: int, frame: FrameType | None) -> NoReturn:
+    """End the process; an error would not do, since Blender's own start may catch it."""
+    interruption = Interrupted(number)
+    _tell(str(interruption))
+    os._exit(interruption.code)
+
+
+def _tell(reason: str) -> None:
+    print(f"wks_segment: {reason}", file=sys.stderr, flush=True)
+    if "--json" in sys.argv:
+        print(json.dumps({"error": reason}), flush=True)
 
 
 def _why_not_loaded(error: ImportError) -> str:

@@ -80,8 +80,8 @@ def quiet(request):
         assert complaints(request.getfixturevalue("blender").log()) == []
 
 
-EXPECTED_LINES = ("list of mounted file-systems",)
-"""Lines that Blender always prints in a chroot."""
+EXPECTED_LINES = ("list of mounted file-systems", "You have changed these")
+"""Lines that Blender always prints in a chroot, and warnings of ours that tests ask for."""
 
 
 def complaints(log):

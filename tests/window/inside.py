@@ -175,6 +175,22 @@ def make_active(name):
     yield from settle()
 
 
+def edit_material(name, metallic, new_name):
+    """Set a value of a material's shader and rename the material, as an artist does in the Properties editor."""
+    material = bpy.data.materials[name]
+    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    shader.inputs["Metallic"].default_value = metallic
+    material.name = new_name
+    with bpy.context.temp_override(window=_window(), area=_view3d()):
+        bpy.ops.ed.undo_push(message="Edit Material")
+
+
+def materials():
+    """How metallic each material is, by name."""
+    shaders = {material.name: material.node_tree.nodes.get("Principled BSDF") for material in bpy.data.materials}
+    return {name: shader.inputs["Metallic"].default_value for name, shader in shaders.items() if shader is not None}
+
+
 def job_runs():
     """Whether a job is running."""
     with bpy.context.temp_override(window=_window(), area=_view3d()):

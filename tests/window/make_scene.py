@@ -1,7 +1,7 @@
-"""Make a scene for a test: `blender --background --python make_scene.py -- creature|BODIES.npz OUT.blend`.
+"""Make a scene for a test: `blender --background --python make_scene.py -- creature|pair|BODIES.npz OUT.blend`.
 
-`creature` is the walking creature of the demo. A .npz file has arrays `vertices_0`, `faces_0`, …, for each of which the
-scene gets a selected mesh object.
+`creature` is the walking creature of the demo, `pair` has a small one beside it, on the ground. A .npz file has arrays
+`vertices_0`, `faces_0`, …, for each of which the scene gets a selected mesh object.
 """
 
 import importlib
@@ -24,6 +24,22 @@ def creature():
         obj.select_set(False)
 
 
+def pair():
+    """Build two creatures, the small one named "Calf", and ground and a lamp."""
+    creature()
+    large = bpy.data.objects["Creature"]
+    creature()
+    calf = next(obj for obj in bpy.data.objects if obj.type == "MESH" and obj != large)
+    calf.name = "Calf"
+    calf.parent.name, calf.parent.location.x, calf.parent.scale = "Calf rig", 1.5, (0.5,) * 3
+    mesh = bpy.data.meshes.new("Ground")
+    mesh.from_pydata([(-4, -4, 0), (4, -4, 0), (4, 4, 0), (-4, 4, 0)], [], [(0, 1, 2, 3)])
+    lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "AREA"))
+    for prop in (bpy.data.objects.new("Ground", mesh), lamp):
+        bpy.context.scene.collection.objects.link(prop)
+    lamp.location = (0, 0, 4)
+
+
 def bodies(path):
     """Add the bodies of a file side by side, all selected."""
     with np.load(path) as arrays:
@@ -41,8 +57,8 @@ def bodies(path):
 content, out = sys.argv[sys.argv.index("--") + 1 :]
 for name in ("Cube", "Camera", "Light"):
     bpy.data.objects.remove(bpy.data.objects[name])
-if content == "creature":
-    creature()
+if content in ("creature", "pair"):
+    globals()[content]()
 else:
     bodies(content)
 bpy.ops.wm.save_as_mainfile(filepath=out)

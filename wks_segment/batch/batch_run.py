@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import shutil
-import signal
 import sys
-import threading
 import time
-from collections.abc import Generator, Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Generator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -110,9 +108,9 @@ class Batch:
         """Run jobs; the outcome of each is logged at once."""
         n_before = n_done = n_files - len(jobs)
         begun, n_failed = time.monotonic(), 0
-        progress(n_done / n_files, _progress_text(n_done, n_files))
-        with _interrupted_by_signals(), closing(self._outcomes(jobs, unfinished)) as outcomes:
+        with closing(self._outcomes(jobs, unfinished)) as outcomes:
             try:
+                progress(n_done / n_files, _progress_text(n_done, n_files))
                 for outcome in outcomes:
                     # First the log, then the files: a file that is in no log counts as somebody else's.
                     log.add(outcome)
@@ -236,18 +234,3 @@ def _duration(seconds: float) -> str:
     if seconds < 90:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
-
-
-@contextmanager
-def _interrupted_by_signals() -> Iterator[None]:
-    """Raise KeyboardInterrupt on SIGINT (Ctrl+C) and SIGTERM; Blender would handle SIGINT in its own way."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    signals = [signal.SIGINT, signal.SIGTERM]
-    previous = [signal.signal(number, signal.default_int_handler) for number in signals]
-    try:
-        yield
-    finally:
-        for number, handler in zip(signals, previous, strict=True):
-            signal.signal(number, signal.SIG_DFL if handler is None else handler)

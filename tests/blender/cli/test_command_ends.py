@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ from command_files import QUICK
 
 from wks_segment.blender.cli import main
 from wks_segment.blender.workflow import pipeline
+from wks_segment.interruption import Interrupted
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -36,7 +38,7 @@ def python(code, *arguments, **environment):
         (SystemExit(3), 1, "SystemExit"),
         (MemoryError(), 1, "not enough memory"),
         (PermissionError(13, "Permission denied", "/some/file"), 1, "/some/file: Permission denied"),
-        (KeyboardInterrupt(), 130, "interrupted"),
+        (Interrupted(signal.SIGINT), 130, "interrupted"),
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, BaseException) else "",
 )

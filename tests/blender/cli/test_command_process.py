@@ -43,14 +43,53 @@ def test_process_that_fails_ends_with_1(tmp_path):
     assert (done.code, list(done.result)) == (1, ["error"])
 
 
-@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT to send to another process")
-def test_interrupted_process_ends_at_once_without_a_crash(folder):
-    # Processes that a shell starts in the background ignore the signal, and so may these tests and their processes.
-    heed_signal = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)}
-    running = process("segment", folder / "walker.blend", "--frames", 20, **heed_signal)
+needs_signals = pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send to another process")
+# Processes that a shell starts in the background ignore Ctrl+C, and so may these tests and their processes.
+HEEDS_SIGNALS = {} if os.name == "nt" else {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)}
+ENDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "ended from outside"}
+
+
+def check_interrupted(done, number):
+    assert done.code == 128 + number, done
+    assert list(done.result) == ["error"]
+    assert done.result["error"].startswith(ENDS[number])
+    assert "Traceback" not in done.err
+
+
+@needs_signals
+@pytest.mark.parametrize("number", ENDS)
+def test_interrupted_process_prints_one_json_object(folder, number):
+    running = process("segment", folder / "walker.blend", "--frames", 20, "--json", **HEEDS_SIGNALS)
     for line in running.stderr:
         if "Signature" in line:
             break
-    running.send_signal(signal.SIGINT)
+    running.send_signal(number)
+    check_interrupted(ended(running), number)
+
+
+@needs_signals
+@pytest.mark.parametrize("number", ENDS)
+def test_process_that_is_interrupted_while_blender_starts(folder, number):
+    code = (
+        "import os, sys, types, runpy; bpy = sys.modules['bpy'] = types.ModuleType('bpy'); "
+        "bpy.__getattr__ = lambda name: os.kill(os.getpid(), {}); runpy.run_module('wks_segment', run_name='__main__')"
+    )
+    running = subprocess.Popen(
+        [sys.executable, "-c", code.format(int(number)), "segment", "walker.blend", "--json"],
+        cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **HEEDS_SIGNALS,
+    )  # fmt: skip
+    check_interrupted(ended(running), number)
+
+
+@needs_signals
+def test_terminated_batch_prints_one_json_object(folder, tmp_path):
+    running = process(
+        "batch", "learn", folder, "--frames", 20, "--output", tmp_path / "out", "--json", **HEEDS_SIGNALS
+    )  # fmt: skip
+    for line in running.stderr:
+        if "0 of" in line:
+            break
+    running.send_signal(signal.SIGTERM)
     done = ended(running)
-    assert done.code in (1, 128 + signal.SIGINT, -signal.SIGINT), done
+    assert list(done.result) == ["error"]
+    assert "--resume" in done.result["error"]

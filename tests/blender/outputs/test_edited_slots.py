@@ -157,3 +157,17 @@ def test_mesh_without_materials(settings):
     OPS.clear()
     assert not obj.material_slots
     assert "material_index" not in obj.data.attributes
+
+
+@pytest.mark.parametrize("step", ["learn", "apply", "update", "merge_segments", "clear"])
+def test_faces_that_cannot_get_their_material_back_are_named(obj, settings, printed, step):
+    OPS.clear()
+    settings.write_materials = True
+    OPS.learn()
+    bpy.data.materials.remove(bpy.data.materials["Metal"])
+    n_lost = sum(name == "Metal" for name in EXPECTED)
+    if step == "update":
+        settings.smoothness = 2.0
+    printed()
+    getattr(OPS, step)(**{"into": 1} if step == "merge_segments" else {})
+    assert f'{n_lost} faces of "Limbed" keep "Segment' in printed().out

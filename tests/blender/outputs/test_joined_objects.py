@@ -104,6 +104,71 @@ def test_clear_after_a_join(tmp_path, join, reopened):
     assert not [name for name in bpy.data.materials.keys() if name.startswith("Segment")]  # noqa: SIM118
 
 
+def in_face_sets(name, had_sets, parts, options):
+    obj = limbed(name, subdivisions=2)
+    if had_sets:
+        # Blender 4.2 joins more than five into others of the same object.
+        size = 10 if bpy.app.version >= (5, 0, 0) else 20
+        sets = 1 + np.arange(len(obj.data.polygons), dtype=np.int32) // size
+        obj.data.attributes.new(FACE_SETS, "INT", "FACE").data.foreach_set("value", sets)
+    if parts:
+        write_labels(obj.data, stripes(obj.data, parts), options)
+    return obj
+
+
+def borders_of_sets(obj):
+    """Which faces are in the same set; none are if there are no sets."""
+    if FACE_SETS not in obj.data.attributes:
+        return None
+    sets = numbers(obj.data, FACE_SETS)
+    return np.equal.outer(sets, sets)
+
+
+STATES = [
+    (had_sets, parts, OutputOptions(face_sets=writes))
+    for had_sets in (False, True)
+    for parts, writes in ((0, False), (3, False), (5, True))
+]
+
+
+@pytest.mark.parametrize("second", STATES, ids=lambda state: f"sets {state[0]}, {state[1]} parts")
+@pytest.mark.parametrize("first", STATES, ids=lambda state: f"sets {state[0]}, {state[1]} parts")
+def test_face_sets_after_a_join(first, second):
+    """As if the objects had been joined without segments."""
+    expected = borders_of_sets(
+        joined(*(in_face_sets(str(i), had, 0, None) for i, (had, _, _) in enumerate((first, second))))
+    )
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    obj = joined(*(in_face_sets(str(i), *each) for i, each in enumerate((first, second))))
+    if first[1] or second[1]:
+        select(obj)
+        OPS.clear()
+    np.testing.assert_array_equal(borders_of_sets(obj), expected)
+
+
+@pytest.mark.parametrize("steps", ["clear", "reopen, clear", "write, clear", "write, reopen, clear"])
+@pytest.mark.parametrize("active", [0, 3])
+def test_id_maps_of_joined_objects(settings, tmp_path, active, steps):
+    settings.bake_size, settings.bake_unwrap = 64, True
+    first, second, other = (character(name, SKIN, parts) for name, parts in (("A", active), ("B", 5), ("C", 4)))
+    for obj in (first, second, other):
+        select(obj)
+        if obj != first or active:
+            OPS.bake()
+    joined(first, second)
+    for step in steps.split(", "):
+        if step == "reopen":
+            bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "joined.blend"))
+            bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "joined.blend"))
+        select(bpy.data.objects["A"])
+        if step == "write":
+            write_labels(bpy.context.object.data, stripes(bpy.context.object.data), OutputOptions())
+            assert "B ID Map" in bpy.data.images
+        if step == "clear":
+            OPS.clear()
+    assert [image.name for image in bpy.data.images] == ["C ID Map"]
+
+
 def test_joined_labels_are_written_again(settings):
     """Apply and the like begin with what is there."""
     obj = joined(character("A", SKIN, 3), character("B", METAL, 5))
@@ -113,6 +178,22 @@ def test_joined_labels_are_written_again(settings):
     assert [material.name for material in obj.data.materials] == [*SKIN, *METAL]
     half = len(obj.data.polygons) // 2
     assert state(obj)["materials"] == [SKIN[i % 2] for i in range(half)] + [METAL[i % 2] for i in range(half)]
+    assert sorted(obj.vertex_groups.keys()) == ["Of A", "Of B"]
+
+
+@pytest.mark.parametrize("active", [0, 5])
+def test_joined_labels_are_listed_and_edited(settings, active):
+    """Also where the object that the others were joined with had none."""
+    obj = joined(character("A", SKIN, active), character("B", METAL, 5))
+    select(obj)
+    OPS.refresh_segments()
+    assert [item.number for item in settings.segments] == [0, 1, 2, 3, 4]
+    assert OPS.merge_segments(into=1) == {"FINISHED"}
+    assert [item.number for item in settings.segments] == [1, 2, 3, 4]
+    slots = [material.name for material in obj.data.materials if material.name.startswith("Segment")]
+    assert slots == ["Segment 2", "Segment 3", "Segment 4", "Segment 5"]
+    OPS.clear()
+    assert [material.name for material in obj.data.materials] == [*SKIN, *METAL]
     assert sorted(obj.vertex_groups.keys()) == ["Of A", "Of B"]
 
 

@@ -105,7 +105,7 @@ def test_a_separated_object_that_was_changed_stays(labeled, printed):
     second.name = "Arm"
     printed()
     OPS.clear()
-    assert "2 separated objects have changed since and are kept" in printed().out
+    assert 'You have changed these separated objects, they stay: "Arm", "Segment 1"' in printed().out
     assert sorted(obj.name for obj in bpy.data.objects) == ["Arm", "Limbed", "Segment 1"]
     assert not separated_from(labeled)
 

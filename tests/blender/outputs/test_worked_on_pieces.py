@@ -11,7 +11,7 @@ from wks_segment.blender.outputs.options import OutputOptions
 
 pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
-KEPT = "1 separated objects have changed since and are kept"
+KEPT = 'You have changed these separated objects, they stay: "{}"'
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def pieces(settings):
     obj.shape_key_add(name="Thin")
     obj.modifiers.new("Sub", "SUBSURF").levels = 0
     obj["export"], obj["is_body"] = "body", True
-    obj.modifiers.new("Hair", "PARTICLE_SYSTEM")
+    obj.modifiers.new("Hair", "PARTICLE_SYSTEM").particle_system.settings.type = "HAIR"
     obj.modifiers.new("Nodes", "NODES").node_group = node_group()
     write_labels(obj.data, stripes(obj.data), OutputOptions(materials=True, vertex_groups="hard", seams=True))
     select(obj)
@@ -141,7 +141,7 @@ def test_a_piece_that_was_worked_on_stays(pieces, printed, work):
     OPS.clear()
     assert name in bpy.data.objects
     assert bpy.data.objects[name].data == mesh
-    assert KEPT in printed().out
+    assert KEPT.format(name) in printed().out
     kept = {name, "Limbed", "Mine", "Shares"}
     assert set(bpy.data.objects.keys()) <= kept, "pieces without work are removed"
 
@@ -199,10 +199,37 @@ def test_pieces_without_work_are_removed(pieces, tmp_path, printed, what):
     select(bpy.data.objects["Segment 1"])
     printed()
     OPS.clear()
-    assert "are kept" not in printed().out
+    assert "they stay" not in printed().out
     assert bpy.data.objects.keys() == ["Limbed"]
     assert bpy.data.meshes.keys() == ["Limbed"]
     assert sorted(bpy.data.materials.keys()) == ["Cloth", "Skin"]
+
+
+def rename_original():
+    bpy.data.objects["Limbed"].name = "Hero"
+    bpy.data.meshes["Limbed"].name = "Body"
+
+
+def rename_what_is_used():
+    for block in (*bpy.data.collections, *bpy.data.actions, *bpy.data.node_groups, *bpy.data.particles):
+        block.name = f"My {block.name}"
+    bpy.data.materials["Skin"].name = "Leather"
+    bpy.context.scene.name = "Take 1"
+
+
+@pytest.mark.parametrize(
+    ("rename", "is_reloaded"), [(rename_original, False), (rename_original, True), (rename_what_is_used, False)]
+)
+def test_pieces_are_removed_when_something_else_was_renamed(pieces, tmp_path, printed, rename, is_reloaded):
+    rename()
+    if is_reloaded:
+        reloaded(tmp_path)
+    select(bpy.data.objects["Segment 1"])
+    printed()
+    OPS.clear()
+    assert "they stay" not in printed().out
+    assert len(bpy.data.objects) == len(bpy.data.meshes) == 1
+    assert len(bpy.data.materials) == 2
 
 
 def test_a_copy_of_a_piece_stays(pieces):

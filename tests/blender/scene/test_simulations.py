@@ -1,17 +1,23 @@
 """Simulations that were played and not baked keep their frames, whatever is asked for."""
 
+import contextlib
 from itertools import pairwise
 
 import bpy
 import numpy as np
 import pytest
 from builders import coordinates, limbed, limbed_rigged, refuses, rig, select
+from painted_objects import stripes
 
+from wks_segment.blender.outputs.labels import write_labels
+from wks_segment.blender.outputs.overrides import keep_by_hand
 from wks_segment.blender.scene import poses as reader
 from wks_segment.blender.scene.characters import Character
+from wks_segment.blender.workflow import segment_list
 
 pytestmark = pytest.mark.usefixtures("scene")
-LEARN = bpy.ops.wks_segment.learn
+OPS = bpy.ops.wks_segment
+LEARN = OPS.learn
 LAST = 8
 
 
@@ -88,6 +94,81 @@ def test_a_played_simulation_is_to_be_baked_before_labels_are_written(settings, 
     select(obj)
     refuses(LEARN, '"Simulation" of "Skirt" is not baked.*Bake it first')
     assert (cache_of(obj).info, bpy.context.scene.frame_current) == (before, 5)
+
+
+def rename_and_recolor():
+    """Not refused: the list changes, and the mesh gets names and colors with its next labels."""
+    segment = bpy.context.scene.wks_segment.segments[0]
+    segment.name, segment.color = "Arm", (1, 0, 0)
+
+
+def transfer():
+    source = limbed("Body", subdivisions=3)
+    write_labels(source.data, stripes(source.data))
+    select(source, bpy.data.objects["Skirt"])
+    OPS.transfer()
+
+
+def live():
+    bpy.context.scene.wks_segment.smoothness = 2.0
+    OPS.update()
+
+
+CHANGES = {
+    "learn": LEARN,
+    "apply": lambda: OPS.apply(),
+    "live": live,
+    "clear": lambda: OPS.clear(),
+    "merge": lambda: OPS.merge_segments(into=1),
+    "restore": lambda: OPS.restore_segments(),
+    "forget": lambda: OPS.forget_faces(),
+    "rename and recolor": rename_and_recolor,
+    "hide": lambda: OPS.hide_segment(part=0),
+    "isolate": lambda: OPS.isolate_segment(),
+    "show": lambda: OPS.show_segments(),
+    "select": lambda: OPS.select_segment(),
+    "separate": lambda: OPS.separate(),
+    "unwrap": lambda: OPS.unwrap(),
+    "bake": lambda: OPS.bake(),
+    "transfer": transfer,
+    "segments from": lambda: OPS.segments_from(source="MATERIALS"),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_no_button_throws_frames_away(settings, change):
+    obj = simulated("CLOTH")
+    settings.bake_unwrap, settings.bake_size = True, 64
+    settings.vertex_groups, settings.write_materials = "hard", True
+    select(obj)
+    LEARN()
+    keep_by_hand(obj.data, np.where(np.arange(len(obj.data.polygons)) < 9, 2, -1))
+    segment_list.fill(settings)
+    obj.data.materials.append(bpy.data.materials.new("Velvet"))
+    play()
+    bpy.context.scene.frame_set(5)
+    before = cache_of(obj).info
+    assert before.startswith(f"{LAST} frames")
+    with (
+        contextlib.nullcontext()
+        if change == "rename and recolor"
+        else pytest.raises(RuntimeError, match="Bake it first")
+    ):
+        CHANGES[change]()
+    bpy.context.view_layer.update()
+    assert (cache_of(obj).info, cache_of(obj).is_outdated) == (before, False)
+    assert bpy.context.mode == "OBJECT"
+
+
+def test_an_outdated_simulation_is_no_reason(settings):
+    obj = simulated()
+    select(obj)
+    LEARN()
+    play()
+    for mode in ("EDIT", "OBJECT"):
+        bpy.ops.object.mode_set(mode=mode)
+    assert cache_of(obj).is_outdated
+    assert OPS.clear() == {"FINISHED"}
 
 
 def test_a_simulation_that_was_not_played_has_one_pose_in_all_frames(settings):

@@ -300,3 +300,63 @@ def test_actions_of_shape_keys_are_chosen_as_well(frames):
     assert learned(frames)[1] == ['"Keyed": the poses are from the action "Smile"; others: "Still"']
     assert not changes(before, scene_snapshot())
     assert (keys.animation_data.action.name, round(keys.key_blocks[1].value, 3)) == ("Still", 0.2)
+
+
+def robot(path, separate):
+    """A glTF file of two boxes without armature, under a turning node, with an animation for each of two names."""
+    turning = bpy.data.objects.new("Turning", None)
+    bpy.context.scene.collection.objects.link(turning)
+    body, arm = limbed("Body", subdivisions=2), limbed("Arm", subdivisions=2)
+    arm.location = (0, 0, 4)
+    for obj in (body, arm):
+        obj.parent = turning
+    if not separate:
+        arm.parent = body
+    for name, bend in (("Wave", 1.2), ("Nod", 0.3)):
+        for obj, axis, angle in ((turning, 2, 0.5), (arm, 0, bend)):
+            data = obj.animation_data_create()
+            data.action = bpy.data.actions.new(f"{name} {obj.name}")
+            for frame in (1, 11, 21):
+                obj.rotation_euler[axis] = angle * (frame == 11)
+                obj.keyframe_insert("rotation_euler", frame=frame)
+            track = data.nla_tracks.new()
+            track.name = name
+            track.strips.new(name, 1, data.action)
+            data.action = None
+    bpy.ops.export_scene.gltf(filepath=str(path), export_animation_mode="NLA_TRACKS")
+
+
+@pytest.mark.parametrize("separate", [False, True])
+def test_animations_of_nodes_are_chosen_as_actions(command, tmp_path, separate):
+    path = tmp_path / "robot.glb"
+    robot(path, separate)
+    done = command("segment", path, "--frames", 3, *QUICK, "--json")
+    assert any('the poses are from the action "Wave"; others: "Nod"' in note for note in done.result["notes"]), done
+    assert not any("the same" in warning for warning in done.result["warnings"])
+    done = command("segment", path, "--frames", 3, "--action", "Nod", *QUICK, "--json")
+    assert (done.code, len(done.result["poses"])) == (0, 3)
+    assert not any("Wave" in note for note in done.result["notes"])
+
+
+@pytest.mark.parametrize("separate", [False, True])
+def test_animations_of_nodes_come_back(frames, tmp_path, separate):
+    """In the window what the importer assigned stays, unless the character does not move by it."""
+    robot(tmp_path / "robot.glb", separate)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.import_scene.gltf(filepath=str(tmp_path / "robot.glb"))
+    arm, turning = bpy.data.objects["Arm"], bpy.data.objects["Turning"]
+    for obj in (arm, turning):
+        obj.animation_data.action = None
+    arm.rotation_quaternion = turned = (0.8, 0.6, 0, 0)
+    select(bpy.data.objects["Body"], arm)
+    settings = bpy.context.scene.wks_segment
+    settings.source, settings.pose_count = "FRAMES", 3
+    before = scene_snapshot(), tuple(turning.rotation_quaternion)
+    report = Report([])
+    poses = read_training_poses(bpy.context, settings, report)
+    assert any('the action "Wave"' in note for note in report.choices), report.choices
+    assert not poses[0].is_like(poses[1])
+    assert not changes(before[0], scene_snapshot())
+    assert arm.animation_data.action is turning.animation_data.action is None
+    assert tuple(arm.rotation_quaternion) == pytest.approx(turned)
+    assert tuple(turning.rotation_quaternion) == before[1]

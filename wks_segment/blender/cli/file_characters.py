@@ -9,7 +9,7 @@ import bpy
 
 from ...core.message import Message
 from ..errors import UserError
-from ..scene.actions import assign_action
+from ..scene.actions import assign_action, assign_take
 from ..scene.characters import Character, armature_of, evaluated_objects, group, mesh_objects, quoted
 from ..workflow.report import Report
 
@@ -91,6 +91,8 @@ def _scene_with_meshes(path: Path, names: Sequence[str] | None, report: Report) 
 def set_action(characters: Sequence[Character], name: str | None) -> None:
     """Assign the action of a name, if one is given, to the armature of each object, or to the object without one."""
     if name is None:
+        return
+    if assign_take(Character(tuple(obj for character in characters for obj in character.objects)), name):
         return
     action = bpy.data.actions.get(name)
     if action is None:

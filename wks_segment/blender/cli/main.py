@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import signal
 import sys
 import traceback
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any, NoReturn
 
 from ...batch import CHILD_COMMAND, Answer, serve
 from ...core.progress import Progress
+from ...interruption import Interrupted, handled, interruptible
 from ..errors import UserError
 from ..streams import flush_streams
 from .commands import apply, bake, batch, demo, rank, segment
@@ -20,8 +22,6 @@ from .terminal import only_result_on_stdout, terminal_progress
 
 COMMAND_MODULES = (segment, apply, rank, bake, batch, demo)
 """Modules that each add one or two commands, in the order of the help."""
-INTERRUPTED = 130
-"""Exit code after Ctrl+C, as shells have it."""
 
 
 class UsageError(Exception):
@@ -54,7 +54,8 @@ def run(arguments: list[str]) -> int:
     Returns
     -------
     int
-        0 if the command succeeded; 1 if it failed, with the reason on standard error; 2 for wrong usage.
+        0 if the command succeeded; 1 if it failed, with the reason on standard error; 2 for wrong usage; 130 after
+        Ctrl+C, 143 after SIGTERM.
     """
     as_json = "--json" in arguments
     try:
@@ -66,24 +67,25 @@ def run(arguments: list[str]) -> int:
         return code
     with only_result_on_stdout() as stdout:
         code, result, text = _ended(options)
-        if as_json:
-            print(json.dumps(_strictly(result), default=str), file=stdout)
-        elif text:
-            print(text, file=stdout)
+        with handled(signal.SIG_IGN):  # the command has ended
+            if as_json:
+                print(json.dumps(_strictly(result), default=str), file=stdout)
+            elif text:
+                print(text, file=stdout)
     return code
 
 
 def _ended(options: argparse.Namespace) -> tuple[int, dict[str, Any], str]:
     """Run a command; its exit code, its result or the reason why there is none, and the result as text."""
     try:
-        with terminal_progress() as progress:
+        with interruptible(), terminal_progress() as progress:
             result = options.run(options, progress)
         code = int(bool(result.get("failed")))  # files of a batch
         return code, result, "" if options.json else options.text(result)
     except UsageError as error:
         return _wrong_usage(error)
-    except KeyboardInterrupt:
-        return _failure("interrupted", INTERRUPTED)
+    except Interrupted as error:
+        return _failure(str(error), error.code)
     except BaseException as error:
         reason = reason_of(error)
         if reason is None:
@@ -154,7 +156,8 @@ def _parser() -> argparse.ArgumentParser:
 
 def _serve(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     """Run as the child process of a batch."""
-    serve(options.folder, answer)
+    with handled(signal.SIG_DFL):  # the child ends at once, without an answer
+        serve(options.folder, answer)
     return {}
 
 

@@ -68,8 +68,9 @@ class WKS_SEGMENT_OT_forget_faces(BaseOperator, bpy.types.Operator):
                 forgotten = (parts >= 0) & (read_bools(mesh.polygons, "select") | (not selected_only))
                 count += int(forgotten.sum())
                 keep_by_hand(mesh, np.where(forgotten, -1, parts))
-            segment_list.rewrite_all(settings, objects)
+            warnings = segment_list.rewrite_all(settings, objects)
         _report.tell(self, {"INFO"}, Message("{count} faces have the segment of the model again", count=count))
+        _report.tell_warnings(self, warnings)
         return {"FINISHED"}
 
 
@@ -77,7 +78,7 @@ def _assign(operator: bpy.types.Operator, context: bpy.types.Context, part: int 
     """Assign the selected faces to a part; without one to a new part with this name."""
     settings = context.scene.wks_segment
     # Objects that are not in Edit Mode can have selected faces as well, which are not visible.
-    objects = [obj for obj in segment_list.labeled(settings) if obj.mode == "EDIT"]
+    objects, warnings = [obj for obj in segment_list.labeled(settings) if obj.mode == "EDIT"], list[str]()
     with segment_list.leaving_edit_mode(context):
         selected = {mesh: read_bools(mesh.polygons, "select") for mesh in segment_list.meshes_of(objects)}
         count = sum(int(faces.sum()) for faces in selected.values())
@@ -86,11 +87,12 @@ def _assign(operator: bpy.types.Operator, context: bpy.types.Context, part: int 
                 part = segment_list.make_part(settings, name)
             for mesh, faces in selected.items():
                 keep_by_hand(mesh, np.where(faces, part, by_hand(mesh)))
-            segment_list.rewrite_all(settings, objects)
+            warnings = segment_list.rewrite_all(settings, objects)
             segment_list.activate(settings, part)
     if not count:
         _report.tell(operator, {"WARNING"}, "Select some faces of an object that has segments first")
         return {"CANCELLED"}
     segment = settings.style().name_of(part)
     _report.tell(operator, {"INFO"}, Message("Assigned {count} faces to {segment}", count=count, segment=segment))
+    _report.tell_warnings(operator, warnings)
     return {"FINISHED"}

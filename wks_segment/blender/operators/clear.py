@@ -37,7 +37,7 @@ class WKS_SEGMENT_OT_clear(BaseOperator, bpy.types.Operator):
             )
         names, warnings = {obj.name for obj in selected}, list[str]()
         originals = {original for obj in selected if (original := original_of(obj)) is not None}
-        n_kept = sum(len(unite(context, original)) for original in originals)
+        kept = [obj.name for original in originals for obj in unite(context, original)]
         # Separated objects are out of the scene by now, unless the user has changed them.
         remaining = originals | {obj for obj in context.scene.objects if obj.name in names}
         meshes = {obj.data for obj in remaining if obj.data.library is None}
@@ -50,9 +50,8 @@ class WKS_SEGMENT_OT_clear(BaseOperator, bpy.types.Operator):
             _report.tell(self, {"INFO"}, "Cleared the segments of 1 mesh")
         else:
             _report.tell(self, {"INFO"}, Message("Cleared the segments of {count} meshes", count=n_cleared))
-        if n_kept:
-            _report.tell(
-                self, {"WARNING"}, Message("{count} separated objects have changed since and are kept", count=n_kept)
-            )
+        if kept:
+            template = "You have changed these separated objects, they stay: {names}"
+            _report.tell(self, {"WARNING"}, Message(template, names=quoted(kept)))
         _report.tell_warnings(self, warnings)
         return {"FINISHED"}

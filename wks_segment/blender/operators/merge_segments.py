@@ -47,10 +47,11 @@ class WKS_SEGMENT_OT_merge_segments(BaseOperator, bpy.types.Operator):
         notes, style = settings.notes(), settings.style()
         merged_into = {other: into if old == part else old for other, old in notes.joined.items()}
         settings.keep_notes(replace(notes, joined=merged_into | {part: into}))
-        segment_list.rewrite_all(settings)
+        warnings = segment_list.rewrite_all(settings)
         segment_list.activate(settings, into)
         _report.tell(
             self, {"INFO"},
             Message("Merged {segment} into {other}", segment=style.name_of(part), other=style.name_of(into)),
         )  # fmt: skip
+        _report.tell_warnings(self, warnings)
         return {"FINISHED"}

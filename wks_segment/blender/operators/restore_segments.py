@@ -37,8 +37,9 @@ class WKS_SEGMENT_OT_restore_segments(BaseOperator, bpy.types.Operator):
         for mesh in segment_list.meshes_of(segment_list.labeled(settings)):
             keep_by_hand(mesh, np.full(len(mesh.polygons), -1))
         settings.keep_notes(replace(settings.notes(), joined={}))
-        segment_list.rewrite_all(settings)
+        warnings = segment_list.rewrite_all(settings)
         _report.tell(self, {"INFO"}, AS_THE_MODEL)
+        _report.tell_warnings(self, warnings)
         return {"FINISHED"}
 
 

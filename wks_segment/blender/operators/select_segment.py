@@ -7,7 +7,8 @@ import bpy
 from bpy.props import BoolProperty
 
 from ...core.message import Message
-from ..outputs.ledger import Ledger
+from ..outputs.part_attributes import label_attribute
+from ..scene.simulations import check_may_change
 from ..workflow import segment_list
 from . import _needs, _report
 from ._base import BaseOperator
@@ -39,6 +40,8 @@ class WKS_SEGMENT_OT_select_segment(BaseOperator, bpy.types.Operator):
             return {"CANCELLED"}
         context.scene.tool_settings.mesh_select_mode = (False, False, True)
         if context.mode == "OBJECT":
+            for mesh in segment_list.meshes_of(objects):
+                check_may_change(mesh)  # Edit Mode alone throws frames of a simulation away
             for obj in objects:
                 obj.select_set(True)
             if context.view_layer.objects.active not in objects:
@@ -55,7 +58,7 @@ class WKS_SEGMENT_OT_select_segment(BaseOperator, bpy.types.Operator):
 def _select(mesh: bpy.types.Mesh, part: int) -> int:
     """Select the visible faces of a part in Edit Mode; return how many."""
     edit = bmesh.from_edit_mesh(mesh)
-    labels = edit.faces.layers.int.get(Ledger(mesh).get("faces", ""))
+    labels = edit.faces.layers.int.get(label_attribute(mesh))
     faces = [] if labels is None else [face for face in edit.faces if face[labels] == part and not face.hide]
     for face in faces:
         face.select_set(True)

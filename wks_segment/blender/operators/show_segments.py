@@ -10,6 +10,7 @@ from ...core.mesh.triangle_mesh import BoolArray, IntArray
 from ...core.message import Message
 from ..outputs.part_attributes import labels_on
 from ..scene.attributes import read_bools, read_ints, write_bools
+from ..scene.simulations import check_may_change
 from ..scene.topology import at_corners
 from ..workflow import segment_list
 from . import _needs, _report
@@ -34,6 +35,7 @@ class _HidesFaces(BaseOperator):
             for mesh in meshes:
                 labels = labels_on(mesh)
                 if labels is not None:
+                    check_may_change(mesh)
                     hidden = self.hidden(labels, read_bools(mesh.polygons, "hide"), settings)
                     _hide(mesh, hidden)
                     count += int(hidden.sum())

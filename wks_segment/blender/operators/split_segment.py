@@ -52,6 +52,7 @@ class WKS_SEGMENT_OT_split_segment(BaseOperator, bpy.types.Operator):
             for obj, polygons in polygon_ranges(character):
                 new_parts = part_of_region[np.maximum(regions[polygons], 0)]
                 keep_by_hand(obj.data, np.where(new_parts < 0, by_hand(obj.data), new_parts))
-        segment_list.rewrite_all(settings, objects)
+        warnings = segment_list.rewrite_all(settings, objects)
         _report.tell(self, {"INFO"}, Message("Split {segment} into {count} parts", segment=name, count=count))
+        _report.tell_warnings(self, warnings)
         return {"FINISHED"}

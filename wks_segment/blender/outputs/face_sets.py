@@ -23,6 +23,8 @@ FIRST_FACE_SET = 1
 
 NO_FACE_SET = 0
 """Number on faces that were joined or drawn where Blender had no face sets."""
+NOT_WRITTEN = 0
+"""Mark on faces that were joined or drawn where there were no labels."""
 
 
 class FaceSets:
@@ -50,20 +52,27 @@ class FaceSets:
 
 def _restore(mesh: bpy.types.Mesh, ledger: Ledger, now: IntArray) -> None:
     own, written = (read_face_ints(mesh, ledger.get(key, "")) for key in ("own_face_sets", "written"))
-    restored, is_ours = now.copy(), np.zeros(len(now), dtype=bool)
-    highest = 0 if written is None else int(now[written == 0].max(initial=0))
+    groups = []
     for faces, is_joined in _groups(ledger, written, len(now)):
         ours = _in_our_sets(mesh, ledger, now, own, faces) if is_joined else _in_listed_sets(ledger, now, faces)
-        is_ours |= ours
-        before = np.zeros_like(now) if own is None else own
-        # As Blender does it, sets of an object that was joined get numbers above those of the others.
-        shift = highest if is_joined else 0
-        restored[ours] = np.where(before == NO_FACE_SET, FIRST_FACE_SET, before)[ours] + shift
-        highest = max(highest, int(restored[ours].max(initial=0)))
-    if own is None and is_ours.any() and (is_ours | (now == NO_FACE_SET)).all():
+        groups.append((faces, is_joined, ours))
+    if not any(ours.any() for _, _, ours in groups):
+        return
+    if own is None and all(_is_nothing_of_the_artist(now, *group) for group in groups):
         mesh.attributes.remove(mesh.attributes[FACE_SET_ATTRIBUTE])
-    elif is_ours.any():
-        write_attribute(mesh.attributes[FACE_SET_ATTRIBUTE], restored)
+        return
+    before = np.zeros_like(now) if own is None else own
+    before = np.where(before == NO_FACE_SET, FIRST_FACE_SET, before)
+    restored, highest = now.copy(), 0
+    for faces, is_joined, ours in groups:
+        # As Blender does it, sets of an object that was joined get numbers above those of the others.
+        restored[ours] = before[ours] + (highest if is_joined else 0)
+        highest = max(highest, int(restored[ours].max(initial=0)))
+        others = faces & ~ours & (now != NO_FACE_SET)
+        if now[others].min(initial=highest + 1) <= highest:  # it would become one set with another one
+            restored[others] += highest
+        highest = max(highest, int(restored[others].max(initial=0)))
+    write_attribute(mesh.attributes[FACE_SET_ATTRIBUTE], restored)
 
 
 def _groups(ledger: Ledger, written: IntArray | None, count: int) -> Iterator[tuple[BoolArray, bool]]:
@@ -71,9 +80,15 @@ def _groups(ledger: Ledger, written: IntArray | None, count: int) -> Iterator[tu
     if written is None:
         yield np.ones(count, dtype=bool), False
         return
-    marks = np.unique(written[written != 0]).tolist()
-    for mark in sorted(marks, key=lambda mark: mark != ledger.get(MARK, 0)):
-        yield written == mark, mark != ledger.get(MARK, 0)
+    mark = ledger.get(MARK, NOT_WRITTEN)
+    for other in sorted(np.unique(written).tolist(), key=lambda other: other != mark):
+        yield written == other, other != mark
+
+
+def _is_nothing_of_the_artist(now: IntArray, faces: BoolArray, is_joined: bool, ours: BoolArray) -> bool:
+    """Whether faces of an object were without sets, so that Blender has put all of them into one when it was joined."""
+    others = now[faces & ~ours]
+    return bool((others == NO_FACE_SET).all()) or (is_joined and not ours.any() and len(np.unique(others)) == 1)
 
 
 def _in_listed_sets(ledger: Ledger, now: IntArray, faces: BoolArray) -> BoolArray:
@@ -84,12 +99,13 @@ def _in_our_sets(
     mesh: bpy.types.Mesh, ledger: Ledger, now: IntArray, own: IntArray | None, faces: BoolArray
 ) -> BoolArray:
     """Which faces of an object that was joined are in a set of ours: Blender has added a number to each."""
-    labels = labels_on(mesh)
-    if labels is None:
+    labels, written = labels_on(mesh), read_face_ints(mesh, ledger.get("written", ""))
+    if labels is None or written is None or (written[faces] == NOT_WRITTEN).any():
         return np.zeros_like(faces)
     wanted = labels + FIRST_FACE_SET
+    if own is None or (own[faces] == NO_FACE_SET).all():
+        # All of a part are in one set, or they were not written as face sets. Blender 4.2 does not add the same to all.
+        pairs = np.unique(np.stack([wanted, now], axis=1)[faces], axis=0)
+        return faces if len(pairs) == len(np.unique(pairs[:, 0])) else np.zeros_like(faces)
     added, count = np.unique((now - wanted)[faces], return_counts=True)
-    had_sets = own is not None and bool((own[faces] != NO_FACE_SET).any())
-    if len(added) > 1 and not had_sets:  # not written as face sets
-        return np.zeros_like(faces)
     return np.asarray(faces & np.isin(now - added[count.argmax()], wanted[faces]))

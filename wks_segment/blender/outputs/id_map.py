@@ -13,9 +13,9 @@ from ...core.mesh.triangle_mesh import IntArray
 from ...core.message import Message
 from ..errors import UserError
 from ..parts.part_style import Style
-from ..scene.attributes import read_pixels, write_pixels
+from ..scene.attributes import OUR_HIDDEN_ATTRIBUTE, read_face_ints, read_pixels, write_pixels
 from ..scene.fingerprint import fingerprint, users_of
-from .ledger import Ledger
+from .ledger import MARK, Ledger
 from .own_property import OwnProperty
 from .restore_point import on_failure, remove
 
@@ -25,6 +25,8 @@ IMAGE_PROPERTY = "wks_segment_id_map"
 """Custom property of our images."""
 _MADE = OwnProperty("wks_segment_id_map_made", "as")
 """Custom property of our images: hash of the pixels, and fingerprint ("as") as this Blender ("by") made them."""
+JOINED = "joined_id_maps"
+"""Entry of the ledger for the names of images of meshes that were joined with this one."""
 NO_PART = -1
 """In a map of parts: no face covers the pixel."""
 
@@ -32,13 +34,15 @@ NO_PART = -1
 class IdMapImage:
     """An ID map that shows the parts of a mesh, alone or with other meshes."""
 
-    keys = ("id_map",)
+    keys = ("id_map", JOINED)
 
     def take_back(self, mesh: bpy.types.Mesh, ledger: Ledger) -> None:
         """Remove the image, unless another mesh is in it as well or the artist uses it or has painted on it."""
-        name = ledger.get("id_map", "")
-        ledger.remove("id_map")
-        ledger.warnings += _remove_unused(name)
+        names = [ledger.get("id_map", ""), *ledger.get(JOINED, [])]
+        for key in self.keys:
+            ledger.remove(key)
+        for name in dict.fromkeys(names):
+            ledger.warnings += _remove_unused(name, mesh)
 
 
 def with_margin(part_map: IntArray, margin: int) -> IntArray:
@@ -77,9 +81,10 @@ def write_id_map(
     write_pixels(image, colors[row.reshape(part_map.shape)])
     image.update()
     image.pack()
-    _MADE.put(image, {"pixels": _hash_of(image), "as": _fingerprint_of(image), "by": bpy.app.version_string})
     for ledger in ledgers:
         ledger["id_map"] = image.name
+    made = {"pixels": _hash_of(image), "as": _fingerprint_of(image), "by": bpy.app.version_string}
+    _MADE.put(image, {**made, "marks": [ledger[MARK] for ledger in ledgers]})
     for old_name in dict.fromkeys(old_names):
         warnings += _remove_unused(old_name)
     return image
@@ -98,8 +103,29 @@ def save_image(image: bpy.types.Image, path: Path) -> None:
         raise UserError("{path}: cannot write the image", path=path)
 
 
-def _remove_unused(name: str) -> list[Message]:
+def images_of_joined(mesh: bpy.types.Mesh) -> list[str]:
+    """Names of the images of meshes that were joined with a mesh, whose ledgers are lost."""
+    ledger = Ledger(mesh)
+    written = read_face_ints(mesh, ledger.get("written", OUR_HIDDEN_ATTRIBUTE))
+    marks = set() if written is None else set(np.unique(written).tolist()) - {ledger.get(MARK, 0)}
+    found = [image.name for image in bpy.data.images if marks & _marks_on(image)]
+    return [*dict.fromkeys([*ledger.get(JOINED, []), *found])]
+
+
+def _marks_on(image: bpy.types.Image) -> set[int]:
+    """Marks of the meshes that an image of ours was baked of; older versions do not tell."""
+    made = _MADE.of(image) if IMAGE_PROPERTY in image else None
+    return set() if made is None else set(made.get("marks", ()))
+
+
+def _remove_unused(name: str, cleared: bpy.types.Mesh | None = None) -> list[Message]:
     """Remove the image of ours with this name, if no mesh is in it and the artist neither uses nor changed it.
+
+    Parameters
+    ----------
+    name
+    cleared
+        A mesh that is no longer in it.
 
     Returns
     -------
@@ -107,7 +133,7 @@ def _remove_unused(name: str) -> list[Message]:
         That it was changed, and stays.
     """
     image = _our_image(name)
-    if image is None or _meshes_in(image):
+    if image is None or _meshes_in(image) - {cleared}:
         return []
     if not _is_as_made(image):
         return [Message('The image "{name}" has been changed since it was baked, and stays', name=name)]
@@ -159,5 +185,6 @@ def _our_image(name: str) -> bpy.types.Image | None:
 
 
 def _meshes_in(image: bpy.types.Image) -> set[bpy.types.Mesh]:
-    """Meshes whose parts an image shows."""
-    return {mesh for mesh in bpy.data.meshes if Ledger(mesh).get("id_map", "") == image.name}
+    """Meshes whose parts an image shows, other than those that no object has, as joined objects leave them."""
+    found = (mesh for mesh in bpy.data.meshes if mesh.users)
+    return {mesh for mesh in found if image.name in (Ledger(mesh).get("id_map", ""), *images_of_joined(mesh))}

@@ -13,6 +13,7 @@ from ..scene.attributes import OUR_HIDDEN_ATTRIBUTE, read_face_ints
 from ..scene.vertex_group_access import group_owner
 from .color_attribute import PART_COLORS
 from .face_sets import OWN_FACE_SETS
+from .id_map import JOINED, images_of_joined
 from .ledger import MARK, Ledger
 from .overrides import BY_HAND, MODEL_LABELS
 from .own_materials import KEYS, OWN_KEYS, OWN_MATERIALS
@@ -48,6 +49,9 @@ def adopt(mesh: bpy.types.Mesh) -> None:
         is_like_ours = attribute is not None and (attribute.data_type, attribute.domain) == (data_type, domain)
         if key not in ledger and is_like_ours:
             ledger[key] = name
+    images = images_of_joined(mesh)
+    if images:
+        ledger[JOINED] = images
     labels = labels_on(mesh)
     if labels is not None:
         _adopt_groups(mesh, ledger, np.unique(labels).tolist())

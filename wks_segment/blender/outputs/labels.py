@@ -15,6 +15,7 @@ from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ...core.message import Message
 from ..parts.part_style import Style
 from ..scene.characters import quoted
+from ..scene.simulations import check_may_change
 from ..scene.vertex_group_access import active_group
 from .color_attribute import ColorAttribute
 from .face_sets import FaceSets
@@ -49,6 +50,7 @@ LASTING_OUTPUTS: tuple[LastingOutput, ...] = (UvMap(), IdMapImage(), ByHand())
 def write_labels(
     mesh: bpy.types.Mesh, labels: IntArray, options: OutputOptions = DEFAULT_OUTPUTS,
     merged_into: Mapping[int, int] = NOTHING_MERGED, weights: Mapping[int, FloatArray] | None = None,
+    warnings: list[str] | None = None,
 ) -> IntArray:  # fmt: skip
     """Write the parts of polygons to a mesh with a person's changes, in place of what was written before.
 
@@ -63,12 +65,15 @@ def write_labels(
     weights
         (n,) weights of the model's parts, for soft vertex groups; they follow the changes. Without them the groups are
         hard, if the options ask for groups.
+    warnings
+        Gets what was not taken back of the labels before, and why.
 
     Returns
     -------
     (p,) int array
         The parts as they were written.
     """
+    check_may_change(mesh)
     adopt(mesh)
     given = by_hand(mesh)
     final = merge_parts(np.where(given < 0, labels, given), merged_into)
@@ -86,11 +91,15 @@ def write_labels(
         output.write(mesh, parts, ledger)
     keep_unused()
     mesh.update()
+    if warnings is not None:
+        warnings += ledger.warnings
     return final
 
 
-def rewrite_labels(mesh: bpy.types.Mesh, style: Style, merged_into: Mapping[int, int]) -> None:
+def rewrite_labels(mesh: bpy.types.Mesh, style: Style, merged_into: Mapping[int, int], warnings: list[str]) -> None:
     """Write the labels of a mesh again, with all outputs that it has, after a person's changes."""
+    check_may_change(mesh)
+    adopt(mesh)
     labels, before = model_labels(mesh), labels_on(mesh)
     if labels is None or before is None:
         return
@@ -105,14 +114,14 @@ def rewrite_labels(mesh: bpy.types.Mesh, style: Style, merged_into: Mapping[int,
             weights, vertex_groups = move_weights(mesh, weights, before, labels), "soft"
     options = OutputOptions(
         colors="colors" in ledger,
-        materials="first_slot" in ledger,
+        materials="first_slot" in ledger or "own_materials" in ledger,
         template=template_on(mesh),
         vertex_groups=vertex_groups,
-        face_sets="face_sets" in ledger,
+        face_sets="face_sets" in ledger or "own_face_sets" in ledger,
         seams="seams" in ledger,
         style=style,
     )
-    write_labels(mesh, labels, options, merged_into, weights)
+    write_labels(mesh, labels, options, merged_into, weights, warnings)
 
 
 def clear_labels(mesh: bpy.types.Mesh, warnings: list[str] | None = None) -> bool:
@@ -125,6 +134,7 @@ def clear_labels(mesh: bpy.types.Mesh, warnings: list[str] | None = None) -> boo
     """
     if not has_labels(mesh):
         return False
+    check_may_change(mesh)
     adopt(mesh)
     ledger = Ledger(mesh)
     for output in reversed((*OUTPUTS, *LASTING_OUTPUTS)):

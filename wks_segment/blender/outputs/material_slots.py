@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import bpy
 
@@ -19,6 +20,10 @@ class SlotState:
             for obj in _objects_of(mesh)
         }
         self._active = {obj: obj.active_material_index for obj in self._links}
+
+    def content(self) -> tuple[Any, ...]:
+        """Everything, to be compared."""
+        return self.materials, self._links, self._active
 
     def restore(self, mesh: bpy.types.Mesh) -> None:
         """Bring them back."""

@@ -42,8 +42,10 @@ class MeshState:
         self._properties = _our_properties(mesh)
 
     def restore(self) -> None:
-        """Bring everything back."""
+        """Bring everything back. A mesh that is as it was is not touched: its simulation would lose its frames."""
         mesh = self._mesh
+        if MeshState(mesh)._content() == self._content():
+            return
         self._slots.restore(mesh)  # which changes the attribute of the faces' slots
         now = _attributes(mesh)
         for name, state in now.items():
@@ -67,6 +69,14 @@ class MeshState:
         for name, value in self._properties.items():
             mesh[name] = value
         mesh.update()
+
+    def _content(self) -> tuple[Any, ...]:
+        """Everything, to be compared."""
+        attributes = {
+            name: (state.data_type, state.domain, state.values.tobytes()) for name, state in self._attributes.items()
+        }
+        groups = (self._groups, self._active_group, self._weights)
+        return attributes, self._actives, self._seams.tobytes(), self._slots.content(), groups, self._properties
 
     def _restore_groups(self) -> None:
         """Make all vertex groups again, unless they are as they were."""

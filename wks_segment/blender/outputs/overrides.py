@@ -13,6 +13,7 @@ import numpy as np
 
 from ...core.mesh.triangle_mesh import IntArray
 from ..scene.attributes import read_face_ints, write_attribute
+from ..scene.simulations import check_may_change
 from .ledger import Ledger
 from .output import PartsOfMesh
 from .part_attributes import labels_on
@@ -54,6 +55,7 @@ def by_hand(mesh: bpy.types.Mesh) -> IntArray:
 
 def keep_by_hand(mesh: bpy.types.Mesh, parts: IntArray) -> None:
     """Keep the (p,) parts that the polygons of a mesh with labels were given by hand, −1 for none."""
+    check_may_change(mesh)
     ledger = Ledger(mesh)
     attribute = ledger.attribute("by_hand")
     if not (parts >= 0).any():

@@ -39,7 +39,14 @@ def has_labels(mesh: bpy.types.Mesh) -> bool:
 
 def labels_on(mesh: bpy.types.Mesh) -> IntArray | None:
     """(p,) parts of a mesh's polygons as they were written; None if there are none."""
-    return read_face_ints(mesh, Ledger(mesh).get("faces", ""))
+    return read_face_ints(mesh, label_attribute(mesh))
+
+
+def label_attribute(mesh: bpy.types.Mesh) -> str:
+    """Name of the attribute with the parts of a mesh's polygons; empty if there is none."""
+    # A mesh without labels that was joined with labeled ones has their attributes and no ledger.
+    joined = FACE_ATTRIBUTE if OUR_HIDDEN_ATTRIBUTE in mesh.attributes else ""
+    return str(Ledger(mesh).get("faces", joined))
 
 
 def _labels_of_vertices(mesh: bpy.types.Mesh, labels: IntArray) -> IntArray:

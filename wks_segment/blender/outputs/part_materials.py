@@ -11,7 +11,7 @@ import numpy as np
 from ..parts.palette import linear
 from ..parts.part_ids import default_name
 from ..parts.part_style import Style
-from ..scene.fingerprint import fingerprint, users_of
+from ..scene.fingerprint import fingerprint, is_made_as, made_as, users_of
 from .ledger import has_ledger
 from .own_property import OwnProperty
 from .restore_point import is_removed, on_failure
@@ -25,7 +25,7 @@ OTHER_DEFAULTS = ("location", "location_absolute", "use_backface_culling_lightpr
 SAME_COLOR = 1e-5
 """Largest difference of channels of a color that was set, as Blender rounds them to single precision."""
 _MADE = OwnProperty("wks_segment_made", "as")
-"""Custom property of our materials: name, color and fingerprint ("as") as made, in this version of Blender ("by")."""
+"""Custom property of our materials: name, color, and how they were made, see `made_as`."""
 
 
 def part_of(material: bpy.types.Material | None) -> int | None:
@@ -81,7 +81,8 @@ def is_as_made(material: bpy.types.Material) -> bool:
     """Whether a material of ours has the content and the name that it was made with."""
     made = _made_of(material)
     if made.get("by") == bpy.app.version_string:
-        return without_number(material.name) == without_number(made["name"]) and fingerprint(material) == made["as"]
+        is_named = without_number(material.name) == without_number(made["name"])
+        return is_named and is_made_as(made, lambda label: fingerprint(material, label=label))
     return _is_like_new(material, made["name"])
 
 
@@ -154,8 +155,8 @@ def _paint(material: bpy.types.Material, color: tuple[float, ...]) -> None:
 
 def _enter(material: bpy.types.Material, color: tuple[float, ...]) -> None:
     """Keep how the material is made."""
-    by = bpy.app.version_string
-    _MADE.put(material, {"name": material.name, "color": color, "as": fingerprint(material), "by": by})
+    made = made_as(lambda label: fingerprint(material, label=label))
+    _MADE.put(material, {"name": material.name, "color": color, **made})
 
 
 def _made_of(material: bpy.types.Material) -> dict[str, Any]:

@@ -27,7 +27,7 @@ class RestorePoint:
         self.doomed: list[bpy.types.ID] = []
         self._layer = context.view_layer
         self._active = self._layer.objects.active
-        self._shown = [(obj, obj.select_get(), obj.hide_get(), obj.hide_render) for obj in self._layer.objects]
+        self._shown = {obj: _shown(obj) for obj in self._layer.objects}
         self._known = {_key(block) for block in _all_blocks()}
         self._meshes = [MeshState(mesh) for mesh in dict.fromkeys(meshes)]
         self._settings = [(scene, PropertyState(scene.wks_segment)) for scene in bpy.data.scenes]
@@ -41,7 +41,10 @@ class RestorePoint:
             state.restore()
         for scene, settings in self._settings:
             settings.restore(scene.wks_segment)
-        for obj, selected, hidden, hidden_in_renders in self._shown:
+        for obj, shown in self._shown.items():
+            if _shown(obj) == shown:
+                continue
+            selected, hidden, hidden_in_renders = shown
             obj.hide_set(False, view_layer=self._layer)  # what is hidden cannot be selected
             obj.select_set(selected, view_layer=self._layer)
             obj.hide_set(hidden, view_layer=self._layer)
@@ -105,6 +108,11 @@ def remove(block: Any) -> None:
 def is_removed(block: bpy.types.ID) -> bool:
     """Whether a data-block will be removed at the end of the restore point."""
     return bool(_open) and block in _open[0].doomed
+
+
+def _shown(obj: bpy.types.Object) -> tuple[bool, bool, bool]:
+    """Whether an object is selected, hidden and hidden in renders."""
+    return obj.select_get(), obj.hide_get(), obj.hide_render
 
 
 def _key(block: bpy.types.ID) -> tuple[str, int]:

@@ -14,7 +14,8 @@ from mathutils import Matrix
 from ...core.mesh.triangle_mesh import BoolArray, IntArray
 from ..parts import part_ids
 from ..parts.part_style import Style
-from ..scene.fingerprint import fingerprint, label_of, users_of
+from ..scene.fingerprint import Label, fingerprint, is_made_as, label_of, made_as, users_of
+from ..scene.simulations import check_may_change
 from .ledger import Ledger
 from .own_property import OwnProperty
 from .part_attributes import labels_on
@@ -22,8 +23,7 @@ from .part_materials import without_number
 from .restore_point import on_failure, remove
 
 _SEPARATED = OwnProperty("wks_segment_piece", "as")
-"""Custom property of a separated object: the original ("of"), and a fingerprint ("as") of the object as this version of
-Blender ("by") made it."""
+"""Custom property of a separated object: the original ("of"), and how the object was made, see `made_as`."""
 _ORIGINAL = OwnProperty("wks_segment_whole", "eye")
 """Custom property of the original object: whether it was hidden before."""
 
@@ -36,6 +36,7 @@ def separate(
     A separated object has the parent of the original, or else the original as its parent, and has its collections,
     modifiers, materials, vertex groups, shape keys and UV maps.
     """
+    check_may_change(obj.data)
     separated = [_make(obj, labels, part, style) for part in part_ids.unique_parts(labels)]
     _enter(obj, separated)
     on_failure(lambda: _ORIGINAL.delete(obj))
@@ -95,7 +96,7 @@ def is_as_made(obj: bpy.types.Object) -> bool:
     """Whether a separated object, its mesh, and what uses them, are as they were made."""
     made = _SEPARATED.of(obj)
     if made.get("by") == bpy.app.version_string:
-        return bool(made["as"] == _state(obj))
+        return is_made_as(made, lambda label: _state(obj, made["of"], label))
     # Another version has other properties: then it must be as it would be made again.
     labels, original = labels_on(obj.data), made["of"]
     of_original = labels_on(original.data)
@@ -141,7 +142,8 @@ def _make(obj: bpy.types.Object, labels: IntArray, part: int, style: Style) -> b
 def _enter(original: bpy.types.Object, separated: list[bpy.types.Object]) -> None:
     """Keep how separated objects are made."""
     for obj in separated:
-        _SEPARATED.put(obj, {"of": original, "as": _state(obj), "by": bpy.app.version_string})
+        made = made_as(lambda label, obj=obj: _state(obj, original, label))
+        _SEPARATED.put(obj, {"of": original, **made})
 
 
 def _let_go(own: OwnProperty, obj: bpy.types.Object) -> None:
@@ -150,11 +152,16 @@ def _let_go(own: OwnProperty, obj: bpy.types.Object) -> None:
     own.delete(obj)
 
 
-def _state(obj: bpy.types.Object) -> str:
-    """A hash of all that an artist may change of an object, and of its users."""
+def _state(obj: bpy.types.Object, original: bpy.types.Object | None, label: Label) -> str:
+    """A hash of all that an artist may change of a separated object, and of its users; the original may be renamed."""
     users = users_of(obj, obj.data)
-    names = [label_of(block) for block in (obj, obj.data, *users[obj], *users[obj.data])]
-    return f"{crc32(chr(10).join(names).encode()):08x}{fingerprint(obj, obj.data)}"
+
+    def of_other(block: bpy.types.ID) -> str:
+        return "original" if block == original else label(block)
+
+    own = [label_of(block) for block in users]
+    names = [*own, *(name for block in users for name in sorted(map(of_other, users[block])))]
+    return f"{crc32(chr(10).join(names).encode()):08x}{fingerprint(obj, obj.data, label=of_other)}"
 
 
 def _users(obj: bpy.types.Object) -> list[list[str]]:

@@ -21,6 +21,7 @@ from ..scene.attributes import (
     read_ints,
     write_bools,
 )
+from ..scene.simulations import check_may_change
 from ..scene.topology import at_corners, border_edges, polygon_sizes
 from .uv_maps import UV_MAP_NAME
 
@@ -98,6 +99,7 @@ def _copy_to_unwrap(context: bpy.types.Context, mesh: bpy.types.Mesh) -> Iterato
     Blender's UV operators work on what is in Edit Mode. Vertices at the same place are merged in the copy, since
     importers split them where shading is flat; attributes keep the index of each polygon and corner in the mesh.
     """
+    check_may_change(mesh)  # Blender 4.2 throws frames away as soon as the mesh is copied
     layer, tools = context.view_layer, context.scene.tool_settings
     active, selected, synced = layer.objects.active, list(context.selected_objects), tools.use_uv_select_sync
     copy = mesh.copy()

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import Any
 
 import bpy
 
@@ -71,6 +73,32 @@ def assign_action(owner: bpy.types.ID, action: bpy.types.Action) -> None:
         data.action_slot = data.action_suitable_slots[0]
 
 
+@dataclass(frozen=True, eq=False)
+class Take:
+    """An animation of a character: an action, or what a file has under one name for several objects.
+
+    Attributes
+    ----------
+    name : str
+    actions
+        Action of each armature, shape keys or object that it moves, and the slot if it is known.
+    """
+
+    name: str
+    actions: Mapping[bpy.types.ID, tuple[bpy.types.Action, Any]]
+
+
+def with_owner(character: Character) -> bool:
+    """Whether a character has an armature or shape keys, whose actions can be chosen; else its objects have them."""
+    return _owner(character) is not None
+
+
+def assign_take(character: Character, name: str) -> bool:
+    """Let the animation of this name move a character without armature; False if there is none."""
+    take = next((take for take in _takes(character) if take.name == name), None)
+    return take is not None and not with_owner(character) and _act(take, _owners(character))
+
+
 @contextmanager
 def acting(
     context: bpy.types.Context, character: Character, frames_of: FramesOf, keeps_moving: bool
@@ -86,42 +114,87 @@ def acting(
     keeps_moving : bool
         Whether the action that is assigned stays if the character moves by it, as the artist sees it.
     """
-    owner = armature_with_bones(character) or next(
-        filter(None, (obj.data.shape_keys for obj in character.objects)), None
-    )
-    actions = [] if owner is None else actions_for(owner)
-    own = None if owner is None else _action(owner)
-    if owner is None or not set(actions) - {own} or not _may_act(context, character, owner):
+    takes, owners = _takes(character), _owners(character)
+    own = _assigned(takes, owners)
+    can_choose = any(take is not own for take in takes)
+    if not can_choose or not all(_may_act(context, character, owner) for owner in owners):
         yield []
         return
-    with kept_pose(context, owner) as kept:
+    with ExitStack() as stack:
+        kept = [stack.enter_context(kept_pose(context, owner)) for owner in owners]
+
+        def bring_back() -> None:
+            for pose in kept:
+                pose.restore(context)
+
         (motion,) = motions(context, [character], frames_of)
-        bending: dict[bpy.types.Action | None, float] = {own: motion.bending}
+        bending: dict[Take | None, float] = {own: motion.bending}
         if not (keeps_moving and motion.is_bent):
-            for action in actions:
-                kept.restore(context)
-                if action not in bending and _acts(owner, action):
-                    bending[action] = motions(context, [character], frames_of)[0].bending
+            for take in takes:
+                bring_back()
+                if take is not own and _act(take, owners):
+                    bending[take] = motions(context, [character], frames_of)[0].bending
         best = max(bending, key=bending.__getitem__)  # the assigned one, if all are static
-        kept.restore(context)
-        if best != own:
-            _acts(owner, best)
-        yield [_note(character, best, [action for action in actions if action != best])]
+        bring_back()
+        if best is not None and best is not own:
+            _act(best, owners)
+        yield [_note(character, best, [take for take in takes if take is not best])]
 
 
-def _note(character: Character, action: bpy.types.Action | None, others: list[bpy.types.Action]) -> Message:
-    if action is not None and not others:
-        return Message('"{name}": the poses are from the action "{action}"', name=character.name, action=action.name)
+def _note(character: Character, take: Take | None, others: list[Take]) -> Message:
+    if take is not None and not others:
+        return Message('"{name}": the poses are from the action "{action}"', name=character.name, action=take.name)
     names = ", ".join(f'"{other.name}"' for other in others[:NAMED]) + " …" * (len(others) > NAMED)
-    if action is None:
+    if take is None:
         return Message(
             '"{name}": the poses are from its animation as it is; actions in this file: {others}',
             name=character.name, others=names,
         )  # fmt: skip
     return Message(
         '"{name}": the poses are from the action "{action}"; others: {others}',
-        name=character.name, action=action.name, others=names,
+        name=character.name, action=take.name, others=names,
     )  # fmt: skip
+
+
+def _owner(character: Character) -> Posable | None:
+    """The armature of a character, or its shape keys."""
+    return armature_with_bones(character) or next(
+        filter(None, (obj.data.shape_keys for obj in character.objects)), None
+    )
+
+
+def _owners(character: Character) -> list[Posable]:
+    """What takes of a character move: its armature or shape keys, or else its objects and their parents."""
+    owner = _owner(character)
+    if owner is not None:
+        return [owner]
+    return [block for block in character.animated() if block.animation_data is not None]
+
+
+def _takes(character: Character) -> list[Take]:
+    """The animations that can move a character."""
+    owner = _owner(character)
+    if owner is not None:
+        return [Take(action.name, {owner: (action, None)}) for action in actions_for(owner)]
+    # Importers put each animation of a file into muted NLA tracks of that name, one on each object.
+    found: dict[str, dict[bpy.types.ID, tuple[bpy.types.Action, Any]]] = {}
+    for block in _owners(character):
+        for track in block.animation_data.nla_tracks:
+            if track.mute and len(track.strips) == 1 and track.strips[0].action is not None:
+                (strip,) = track.strips
+                found.setdefault(track.name, {})[block] = strip.action, getattr(strip, "action_slot", None)
+    return [Take(name, actions) for name, actions in found.items()]
+
+
+def _assigned(takes: Sequence[Take], owners: Sequence[Posable]) -> Take | None:
+    """The take that is assigned; None if nothing is."""
+    now = {owner: action for owner in owners if (action := _action(owner)) is not None}
+    if not now:
+        return None
+    for take in takes:
+        if {owner: action for owner, (action, _) in take.actions.items()} == now:
+            return take
+    return Take(next(iter(now.values())).name, {owner: (action, None) for owner, action in now.items()})
 
 
 def _may_act(context: bpy.types.Context, character: Character, owner: Posable) -> bool:
@@ -136,14 +209,21 @@ def _action(owner: bpy.types.ID) -> bpy.types.Action | None:
     return None if owner.animation_data is None else owner.animation_data.action
 
 
-def _acts(owner: Posable, action: bpy.types.Action) -> bool:
-    """Assign an action, alone, to an armature or shape keys at rest; False if it does not fit."""
-    to_rest(owner)
-    try:
-        assign_action(owner, action)
-    except UserError:
-        return False
-    owner.animation_data.use_nla = False
+def _act(take: Take, owners: Sequence[Posable]) -> bool:
+    """Let a take alone move its owners, armatures and shape keys from rest; False if it does not fit."""
+    for owner in owners:
+        to_rest(owner)
+        if owner in take.actions:
+            action, slot = take.actions[owner]
+            try:
+                assign_action(owner, action)
+            except UserError:
+                return False
+            if slot is not None:
+                owner.animation_data.action_slot = slot
+        else:
+            owner.animation_data.action = None
+        owner.animation_data.use_nla = False
     return True
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import bpy
 
 from ...core.message import Message
-from .actions import acting
+from .actions import acting, with_owner
 from .characters import Character, armature_of, group, quoted
 from .motion import FramesOf, motions
 from .touching import joined
@@ -68,7 +68,7 @@ def animated(
     with ExitStack() as stack:
         told: dict[Character, list[Message]] = {}
         if choice.actions:
-            for character in characters:
+            for character in _with_own_actions(characters):
                 told[character] = stack.enter_context(acting(context, character, frames_of, choice.keeps_moving))
         areas = _moving_areas(context, characters, frames_of)
         moving = [character for character in characters if not choice.drops or areas[character] > 0]
@@ -90,6 +90,13 @@ def animated(
             if members & set(character.members):
                 notes += texts
         yield Animated(taken, [*notes])
+
+
+def _with_own_actions(characters: Sequence[Character]) -> list[Character]:
+    """Characters whose actions are chosen, each by itself; objects without armature and shape keys are one."""
+    posable = [character for character in characters if with_owner(character)]
+    others = tuple(obj for character in characters if character not in posable for obj in character.objects)
+    return [*posable, *([Character(others)] if others else [])]
 
 
 def _moving_areas(
@@ -116,7 +123,7 @@ def _one_of(
     largest = max(characters, key=area)
     note = Message(
         'Several characters move: {names}. "{name}" is taken, which has the largest moving surface; make another one '
-        "active, or name it by --object, to take that",
+        "active (on the command line: --object) to take that",
         names=quoted(character.name for character in characters), name=largest.name,
     )  # fmt: skip
     return [largest], [note]

@@ -2,14 +2,15 @@
 
 Nothing is listed that counts as work: all properties that Blender has are read, those of add-ons and custom properties
 among them, except the few that change without an artist. What a data-block owns belongs to it (nodes, shape keys, the
-mesh of an object); what it only uses counts by name.
+mesh of an object); what it only uses counts by its label, which is its name or its number in this session.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from hashlib import blake2b
-from typing import Any
+from typing import Any, TypeAlias
+from uuid import uuid4
 
 import bpy
 import numpy as np
@@ -20,7 +21,7 @@ CHANGING_BY_THEMSELVES = frozenset({
     # Kept by Blender for itself, other from session to session.
     "rna_type", "original", "users", "use_extra_user", "tag", "session_uid", "preview", "library",
     "library_weak_reference", "override_library", "is_valid", "texture_paint_images", "texture_paint_slots",
-    "paint_active_slot", "paint_clone_slot", "from", "id_root",
+    "paint_active_slot", "paint_clone_slot", "from", "id_root", "storage_type",
     # Computed from other properties.
     "name_full", "dimensions", "matrix_world", "matrix_local", "matrix_basis", "bound_box", "loop_triangles",
     "loop_triangle_polygons", "vertex_normals", "polygon_normals", "corner_normals", "color_attributes",
@@ -39,19 +40,52 @@ OUR_PREFIX = "wks_segment"
 """What the names of all our custom properties start with."""
 DEEPEST = 40
 """Levels of properties within properties; Blender's own have fewer than ten."""
+THIS_SESSION = uuid4().hex
+"""Tells this session of Blender from others."""
+Label: TypeAlias = Callable[[bpy.types.ID], str]
 
 
-def fingerprint(*blocks: bpy.types.ID, ignored: Collection[str] = ()) -> str:
+def label_of(block: bpy.types.ID) -> str:
+    """Type and name of a data-block."""
+    return f"{block.bl_rna.identifier} {block.name_full}"
+
+
+def label_here(block: bpy.types.ID) -> str:
+    """A label of a data-block that stays if it is renamed, but holds in this session of Blender only."""
+    return f"{block.bl_rna.identifier} {block.session_uid}"
+
+
+def made_as(hash_with: Callable[[Label], str]) -> dict[str, str]:
+    """How something is made, to be kept with it.
+
+    Parameters
+    ----------
+    hash_with : callable
+        Gives a hash of it, in which other data-blocks have a label.
+    """
+    hashes = {"as": hash_with(label_of), "here": hash_with(label_here)}
+    return {**hashes, "session": THIS_SESSION, "by": bpy.app.version_string}
+
+
+def is_made_as(made: Mapping[str, Any], hash_with: Callable[[Label], str]) -> bool:
+    """Whether something is as it was made, by this version of Blender; what it uses may have other names by now."""
+    here = made.get("session") == THIS_SESSION and made["here"] == hash_with(label_here)
+    return here or bool(made["as"] == hash_with(label_of))
+
+
+def fingerprint(*blocks: bpy.types.ID, ignored: Collection[str] = (), label: Label = label_of) -> str:
     """Hash of data-blocks with all that they own, but for their names.
 
-    The same in another session of the same version of Blender.
+    The same in another session of the same version of Blender, if the label of other data-blocks is.
 
     Parameters
     ----------
     ignored
         Names of properties that do not count.
+    label : callable
+        Label of a data-block that is used.
     """
-    reader = _Reader(blocks, ignored)
+    reader = _Reader(blocks, ignored, label)
     digest = blake2b(bpy.app.version_string.encode(), digest_size=16)
     for block in blocks:
         for piece in reader.read(block):
@@ -69,16 +103,11 @@ def users_of(*blocks: bpy.types.ID) -> dict[bpy.types.ID, list[bpy.types.ID]]:
     }  # fmt: skip
 
 
-def label_of(block: bpy.types.ID) -> str:
-    """Type and name of a data-block."""
-    return f"{block.bl_rna.identifier} {block.name_full}"
-
-
 class _Reader:
     """Reads all properties of some data-blocks and of what they own, each once."""
 
-    def __init__(self, owned: tuple[bpy.types.ID, ...], ignored: Collection[str] = ()) -> None:
-        self._ignored = CHANGING_BY_THEMSELVES | set(ignored)
+    def __init__(self, owned: tuple[bpy.types.ID, ...], ignored: Collection[str], label: Label) -> None:
+        self._ignored, self._label = CHANGING_BY_THEMSELVES | set(ignored), label
         self._owned = {block.session_uid for block in owned}
         self._seen: set[tuple[int, str]] = set()
         self._animated: set[str] = set()
@@ -110,8 +139,8 @@ class _Reader:
                 yield f"{name}:"
                 yield from self._pointer(getattr(struct, name), depth)
             elif self._is_chosen(struct, prop):
-                yield f"{name}={_plain(getattr(struct, name))}"
-        yield from _custom_properties(struct)
+                yield f"{name}={_plain(getattr(struct, name), self._label)}"
+        yield from _custom_properties(struct, self._label)
 
     def _is_chosen(self, struct: Any, prop: bpy.types.Property) -> bool:
         """Whether a property has a value that an artist chooses, rather than animation or Blender."""
@@ -131,7 +160,7 @@ class _Reader:
             if owned and (value.as_pointer(), value.bl_rna.identifier) not in self._seen:
                 yield from self.read(value)
             else:
-                yield label_of(value)
+                yield self._label(value)
         elif (value.as_pointer(), value.bl_rna.identifier) in self._seen or depth > DEEPEST:
             yield str(getattr(value, "name", value.bl_rna.identifier))
         else:
@@ -166,6 +195,8 @@ def _array(items: Any) -> Iterator[str | bytes]:
             continue
         if prop.is_readonly and not isinstance(items[0], bpy.types.MeshPolygon | bpy.types.MeshLoop):
             continue
+        if isinstance(items[0], bpy.types.MeshPolygon) and prop.identifier == "vertices":
+            continue  # as many as the polygon has, which cannot be read at once; its loops have them
         numbers = read_numbers(items, prop)
         if numbers is not None:
             yield prop.identifier
@@ -180,7 +211,7 @@ def _mesh_arrays(mesh: bpy.types.Mesh) -> Iterator[str | bytes]:
         yield np.array([tuple(normal.vector) for normal in mesh.corner_normals], dtype=np.float32).tobytes()
 
 
-def _custom_properties(struct: Any) -> Iterator[str]:
+def _custom_properties(struct: Any, label: Label) -> Iterator[str]:
     """Custom properties that are neither ours nor properties of an add-on, which are read with all others."""
     try:
         items = sorted(struct.items(), key=lambda item: item[0])
@@ -188,21 +219,21 @@ def _custom_properties(struct: Any) -> Iterator[str]:
         return
     for key, value in items:
         if not key.startswith(OUR_PREFIX) and key not in struct.bl_rna.properties:
-            yield f"[{key}]={_plain(value)}"
+            yield f"[{key}]={_plain(value, label)}"
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: Any, label: Label) -> Any:
     """A value in a form that prints the same in every session."""
     if isinstance(value, bpy.types.ID):
-        return label_of(value)
+        return label(value)
     if hasattr(value, "to_dict"):
-        return {key: _plain(value[key]) for key in sorted(value.keys())}
+        return {key: _plain(value[key], label) for key in sorted(value.keys())}
     if isinstance(value, set):
         return sorted(value)
     if hasattr(value, "to_list"):
         return value.to_list()
     if not isinstance(value, str) and hasattr(value, "__len__"):
-        return [_plain(each) for each in value]
+        return [_plain(each, label) for each in value]
     # Custom properties that are true or false can be numbers when a file is opened again.
     return repr(int(value) if isinstance(value, bool) else value)
 

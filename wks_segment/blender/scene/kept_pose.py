@@ -10,7 +10,7 @@ import bpy
 from mathutils import Matrix
 
 Posable: TypeAlias = bpy.types.Object | bpy.types.Key
-"""An armature, or the shape keys of a mesh."""
+"""An armature or another object that is animated, or the shape keys of a mesh."""
 
 
 TRANSFORM = ("rotation_mode", "location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
@@ -58,9 +58,11 @@ def kept_pose(context: bpy.types.Context, owner: Posable) -> Iterator[KeptPose]:
         kept.restore(context)
 
 
-def parts_of(owner: Posable) -> bpy.types.bpy_prop_collection:
-    """The bones of an armature, or the shape keys."""
-    return owner.pose.bones if isinstance(owner, bpy.types.Object) else owner.key_blocks
+def parts_of(owner: Posable) -> Any:
+    """The bones of an armature, or the shape keys; none of another object."""
+    if isinstance(owner, bpy.types.Object):
+        return () if owner.pose is None else owner.pose.bones
+    return owner.key_blocks
 
 
 def to_rest(owner: Posable) -> None:

@@ -30,7 +30,7 @@ class Simulation:
     name : str
         Name of its modifier, or of what else it belongs to.
     frames : int
-        Number of frames that were played; those of a zone are unknown, and count as one.
+        Number of frames that were played and are not outdated; those of a zone are unknown, and count as one.
     deforms : bool
         Whether it moves the object or its vertices.
     is_zone : bool
@@ -86,12 +86,33 @@ def must_not_change(scene: bpy.types.Scene, character: Character) -> bool:
     )
 
 
+def check_may_change(mesh: bpy.types.Mesh) -> None:
+    """Refuse to change a mesh if that would throw frames of a simulation away; called before anything is written.
+
+    Raises
+    ------
+    UserError
+        If a simulation must be baked first.
+    """
+    check_simulations(bpy.context.scene, _characters_of(mesh), over_time=False)
+
+
+def may_change(mesh: bpy.types.Mesh) -> bool:
+    """Whether a change of a mesh throws no frames of a simulation away."""
+    return not any(must_not_change(bpy.context.scene, character) for character in _characters_of(mesh))
+
+
+def _characters_of(mesh: bpy.types.Mesh) -> list[Character]:
+    return [Character((obj,)) for obj in bpy.context.scene.objects if obj.data == mesh]
+
+
 def unbaked(scene: bpy.types.Scene, obj: bpy.types.Object) -> Iterator[Simulation]:
     """The simulations of an object that are not baked."""
     for name, cache, deforms in _point_caches(scene, obj):
         if not (cache.is_baked or cache.use_external):
-            number = re.search(r"\d+", cache.info)
-            yield Simulation(name, int(number[0]) if number else 0, deforms)
+            number = None if cache.is_outdated else re.search(r"\d+", cache.info)
+            frames = int(number[0]) if number else 0
+            yield Simulation(name, frames if frames > 1 else 0, deforms)  # one is the start, which is there at once
     for modifier in obj.modifiers:
         if is_simulation_zone(modifier) and modifier.show_viewport and not _is_baked_to_disk(modifier):
             yield Simulation(modifier.name, 1, True, is_zone=True)

@@ -235,6 +235,7 @@ def write_outputs(
     if renumbered:
         segment_list.carry_over(settings, labels)
     notes, style, written = settings.notes(), settings.style(), [np.zeros(0, dtype=np.int64)]
+    not_taken_back: list[str] = []
     options = replace(request.outputs, style=style)
     with report.stage("write"):
         for character, parts in labels.items():
@@ -243,8 +244,9 @@ def write_outputs(
                 if polygons.stop == polygons.start:
                     continue
                 own = None if weights is None else {part: w[vertices] for part, w in weights[character].items()}
-                written.append(write_labels(obj.data, parts[polygons], options, notes.joined, own))
+                written.append(write_labels(obj.data, parts[polygons], options, notes.joined, own, not_taken_back))
         segment_list.fill(settings)
+    report.warn(*not_taken_back)
     report.parts = {style.name_of(part): part for part in part_ids.unique_parts(np.concatenate(written))}
 
 

@@ -24,6 +24,7 @@ from ..parts.palette import most_different
 from ..props.settings import WKSSegmentSettings
 from ..scene.attributes import read_bools, read_floats
 from ..scene.characters import Character, mesh_objects, polygon_ranges, with_rigged
+from ..scene.simulations import may_change
 from .all_or_nothing import all_or_nothing
 
 SUCCESSOR_OVERLAP = 0.5
@@ -94,13 +95,21 @@ def activate(settings: WKSSegmentSettings, part: int) -> None:
         settings.active_segment = numbers.index(part)
 
 
-def rewrite_all(settings: WKSSegmentSettings, objects: list[bpy.types.Object] | None = None) -> None:
-    """Write the labels of objects (None: of all in the scene) again with the user's current edits, and list them."""
+def rewrite_all(settings: WKSSegmentSettings, objects: list[bpy.types.Object] | None = None) -> list[str]:
+    """Write the labels of objects (None: of all in the scene) again with the user's current edits, and list them.
+
+    Returns
+    -------
+    list of str
+        What was not taken back of the labels before, and why.
+    """
+    warnings: list[str] = []
     notes, written = settings.notes(), labeled(settings, everywhere=True) if objects is None else objects
     with followed(written):
         for mesh in meshes_of(written):
-            rewrite_labels(mesh, settings.style(), notes.joined)
+            rewrite_labels(mesh, settings.style(), notes.joined, warnings)
     fill(settings)
+    return warnings
 
 
 def rename(settings: WKSSegmentSettings, part: int, name: str) -> None:
@@ -137,8 +146,9 @@ def restyle(settings: WKSSegmentSettings, part: int, name: bool = True, color: b
     """Write the current name or color of a part wherever it is written already."""
     style, objects = settings.style(), labeled(settings, everywhere=True)
     with leaving_edit_mode(bpy.context) if color else nullcontext(), followed(objects):
-        # A mesh can be in Edit Mode in another window.
-        for mesh in (mesh for mesh in meshes_of(objects) if not mesh.is_editmode or not color):
+        # A mesh can be in Edit Mode in another window; one whose simulation is not baked follows with its next labels.
+        meshes = [mesh for mesh in meshes_of(objects) if may_change(mesh)]
+        for mesh in (mesh for mesh in meshes if not mesh.is_editmode or not color):
             if name:
                 rename_group(mesh, part, style)
             if color:

@@ -19,6 +19,8 @@ from ..progress import Progress
 MARKED_COST = 0.1
 """Cost of a border along a marked edge, as a fraction of its cost elsewhere: low enough that a border moves to a marked
 edge within reach, and high enough that marked edges alone make no border."""
+BEGINNING = 0.4
+"""Share of a pose's progress that is reported before it is labeled, since nothing can be reported in between."""
 
 
 @dataclass(frozen=True)
@@ -93,10 +95,11 @@ class PolygonMesh:
     ) -> FloatArray:
         """(p, K) mean over triangles and poses of (m, K) posteriors on the faces of each pose.
 
-        Progress is reported after each pose.
+        Progress is reported at the beginning and at the end of each pose.
         """
         total: FloatArray = np.zeros(())
         for i, (pose, in_pose) in enumerate(zip(poses, self._in_poses, strict=True)):
+            progress((i + BEGINNING) / len(poses))
             total = total + in_pose.mean @ posteriors_on(pose)
             progress((i + 1) / len(poses))
         return total / np.maximum(self._times_seen, 1)[:, None]

@@ -115,6 +115,7 @@ class PoseDescriber:
         mesh, laplacian = better_triangles(surface.mesh, self._laplacian())
         step = Progress.of_share(progress)
         step = step.part(SURFACE, 1.0)
+        step(0.0)
         signature = wave_kernel_signature_of(mesh, n_pairs, self.n_energies, self.accuracy, step)
         pose = PoseSignature(surface, signature, self.n_eigenpairs, laplacian)
         if cache is not None:
