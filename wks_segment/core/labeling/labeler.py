@@ -21,6 +21,7 @@ from ..parts.kind_traits import KindTraits
 from ..poses.pose_cache import Kind, ResultKey, Workpiece
 from ..poses.pose_signature import PoseSignature, of_one_mesh
 from ..progress import Progress
+from .learned_areas import with_learned_areas
 from .own_parts import OwnParts, own_parts
 from .polygons import Cleaning, PolygonMesh
 from .region_atlas import RegionAtlas
@@ -222,16 +223,32 @@ class Labeler:
     def _mean_posteriors(
         self, mesh: PolygonMesh, poses: Sequence[Workpiece], of_polygons: bool, n_groups: int, progress: Progress
     ) -> FloatArray:
-        """(p, n_groups) smoothed posteriors of polygons, mean over the poses."""
+        """(p, n_groups) smoothed posteriors of polygons, mean over the poses, with the areas that were learned."""
         progress = progress.never_falling()
         if not self._keeps(max(mesh.n_polygons, *(len(pose.signature) for pose in poses))):
-            return self._symmetric(mesh, mesh.mean(poses, self._on_faces(poses, n_groups, progress), progress))
+            found = self._symmetric(mesh, mesh.mean(poses, self._on_faces(poses, n_groups, progress), progress))
+            return self._with_learned_areas(mesh, found)
         of_kinds = poses[0].results.get(
             ResultKey(Kind.MEAN_POSTERIORS, len(poses), of_polygons),
             (mesh, self.mixture, self.grouping, self.n_kept, self.length),
             lambda: self._symmetric(mesh, mesh.mean(poses, self._on_faces(poses, self.n_kept, progress), progress)),
         )
-        return self._merged(of_kinds, n_groups)
+        return self._with_learned_areas(mesh, self._merged(of_kinds, n_groups))
+
+    def _with_learned_areas(self, mesh: PolygonMesh, posteriors: FloatArray) -> FloatArray:
+        """(p, n_groups) posteriors of polygons with the areas that were learned, if the parts of one mesh were."""
+        grouping = self.grouping
+        # Models of 0.1.0 have one component for each kind, and label as they did.
+        if (
+            grouping is None
+            or self.traits is not None
+            or self.length == 0
+            or grouping.n_kinds == len(self.mixture.weights)
+        ):
+            return posteriors
+        n_groups = posteriors.shape[1]
+        shares = np.bincount(grouping.groups(n_groups), self.mixture.weights, n_groups)
+        return with_learned_areas(posteriors, mesh.areas, shares)
 
     def _symmetric(self, mesh: PolygonMesh, posteriors: FloatArray) -> FloatArray:
         """Posteriors of polygons, the same on both sides of a symmetric mesh; as they are without smoothing."""
