@@ -90,6 +90,8 @@ def encode(model: ModelContent) -> str:
             "natural": np.array(grouping.natural),
         }
         arrays |= {name: getattr(grouping, name) for name in ("certainties", "by_chance", "likeness")}
+        if grouping.areas is not None:
+            arrays["areas"] = grouping.areas
     if traits is not None:
         arrays |= {f"kind_{name}": array for name, array in vars(traits).items()}
     for kind, atlas in zip(REGION_KINDS, model.atlases or (), strict=False):
@@ -156,7 +158,7 @@ def _grouping(arrays: dict[str, FloatArray]) -> MergeTree:
     joins, certainties, by_chance = arrays["joins"].astype(np.int64), arrays["certainties"], arrays["by_chance"]
     if "cuts" not in arrays:
         n_kinds, natural = int(arrays["n_kinds"]), int(arrays["natural"])
-        return MergeTree(joins, certainties, by_chance, arrays["likeness"], n_kinds, natural)
+        return MergeTree(joins, certainties, by_chance, arrays["likeness"], n_kinds, natural, arrays.get("areas"))
     # One group has no border.
     likeness = np.log(np.maximum(arrays["cuts"], LEAST_CUT) / MOST_CUT)
     tree = MergeTree(joins, certainties, by_chance, likeness, len(certainties), 1)
@@ -206,6 +208,8 @@ def _fields(
             _Field("n_kinds", (), 1, k, whole=True),
             _Field("natural", (), 1, k, whole=True),
         )
+        if "areas" in content:
+            yield _Field("areas", (k,), least=0.0, most=1.0)
         if "kind_mean" in content:
             yield from (
                 _Field("kind_mean", (n_kinds,)),

@@ -21,7 +21,7 @@ THREE = kinds([(1, 0), (1, 2)], [0.5, -3.0])
 
 def tree_of(kinds_=THREE, overlaps=None, kind=KIND, places=PLACES, weights=WEIGHTS):
     shares = np.full(kinds_.count, 1 / kinds_.count) if kinds_.count != 3 else SHARES
-    return MergeTree.of(places, weights, kind, kinds_, np.diag(shares) if overlaps is None else overlaps)
+    return MergeTree.of(places, weights, weights, kind, kinds_, np.diag(shares) if overlaps is None else overlaps)
 
 
 @pytest.fixture(scope="module")

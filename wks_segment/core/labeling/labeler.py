@@ -238,16 +238,10 @@ class Labeler:
     def _with_learned_areas(self, mesh: PolygonMesh, posteriors: FloatArray) -> FloatArray:
         """(p, n_groups) posteriors of polygons with the areas that were learned, if the parts of one mesh were."""
         grouping = self.grouping
-        # Models of 0.1.0 have one component for each kind, and label as they did.
-        if (
-            grouping is None
-            or self.traits is not None
-            or self.length == 0
-            or grouping.n_kinds == len(self.mixture.weights)
-        ):
+        if grouping is None or grouping.areas is None or self.traits is not None or self.length == 0:
             return posteriors
         n_groups = posteriors.shape[1]
-        shares = np.bincount(grouping.groups(n_groups), self.mixture.weights, n_groups)
+        shares = np.bincount(grouping.groups(n_groups), grouping.areas, n_groups)
         return with_learned_areas(posteriors, mesh.areas, shares)
 
     def _symmetric(self, mesh: PolygonMesh, posteriors: FloatArray) -> FloatArray:

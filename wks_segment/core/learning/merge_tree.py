@@ -49,6 +49,9 @@ class MergeTree:
         Number of groups that are kinds of parts: with more groups, kinds are split by signature alone.
     natural : int
         Number of groups if it is open: at least 2, if there are 2 components.
+    areas : (K,) array or None
+        Share of the area that each component claims on the learned meshes: Σ over faces of area times its posterior.
+        None for models of 0.1.0.
     """
 
     pairs: IntArray
@@ -57,10 +60,17 @@ class MergeTree:
     likeness: FloatArray
     n_kinds: int
     natural: int
+    areas: FloatArray | None = None
 
     @classmethod
     def of(
-        cls, places: FloatArray, weights: FloatArray, kind: IntArray, kinds: Kinds, overlaps: FloatArray
+        cls,
+        places: FloatArray,
+        weights: FloatArray,
+        areas: FloatArray,
+        kind: IntArray,
+        kinds: Kinds,
+        overlaps: FloatArray,
     ) -> MergeTree:
         """The tree of a mixture.
 
@@ -69,6 +79,8 @@ class MergeTree:
         places : (K, q) array
             Means of the components along axes of about equal weight.
         weights : (K,) array
+        areas : (K,) array
+            See the attributes.
         kind : (K,) int array
             Kind of part of each component. A kind without any is left out.
         kinds : Kinds
@@ -91,7 +103,7 @@ class MergeTree:
         odds = np.array([-MOST_LIKENESS, *likeness[::-1], *[MOST_LIKENESS] * len(inside)])
         natural = max(1 + int(np.count_nonzero(odds[1:MOST_SEGMENTS] < TWO_PARTS)), min(2, len(odds)))
         pairs = np.array(inside + between, dtype=np.int64).reshape(-1, 2)
-        return cls(pairs, certainties, by_chance, odds, len(measures), natural)
+        return cls(pairs, certainties, by_chance, odds, len(measures), natural, areas)
 
     def groups(self, n_groups: int) -> IntArray:
         """(K,) group of each component when `n_groups` are left.

@@ -138,10 +138,12 @@ def learn_parts(
     if len(mixture.weights) < n_segments:
         raise TooFewSamplesError(n_segments, len(mixture.weights))
     step(0.8)
-    posteriors = mixture.group_posteriors(training.standardized, kind, kinds.count)
+    of_components = mixture.posteriors(training.standardized)
+    posteriors = of_components @ np.eye(kinds.count)[kind]
     overlaps = posteriors.T @ (posteriors * training.shares[:, None])
     kinds = _with_vanished_first(kinds, found, after)
-    tree = MergeTree.of(mixture.means @ axes, mixture.weights, kind, kinds, overlaps)
+    areas = training.shares @ of_components
+    tree = MergeTree.of(mixture.means @ axes, mixture.weights, areas, kind, kinds, overlaps)
     kind_of_groups = np.zeros(tree.n_kinds, dtype=np.int64)
     kind_of_groups[tree.groups(tree.n_kinds)] = kind
     return PartMixture(mixture, tree, None if kinds.traits is None else kinds.traits.of_kinds(kind_of_groups))
