@@ -16,6 +16,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "wks_segment"
 BLENDERS_OWN = {"bpy", "bmesh", "mathutils", "bpy_extras", "gpu", "blf", "aud"}
 LAYERS = {
     "core": [
+        {"files"},
         {"mesh"},
         {"spectral"},
         {"geometry"},

@@ -7,6 +7,7 @@ from html import escape
 from pathlib import Path
 from urllib.parse import quote
 
+from ..core.files.whole_file import write_whole
 from .job import Outcome
 
 REPORT_NAME = "report.html"
@@ -56,9 +57,7 @@ def write_report(folder: Path, outcomes: Iterable[Outcome], n_files: int, title:
         "</main></body></html>",
     ])  # fmt: skip
     path = folder / REPORT_NAME
-    unfinished = path.with_suffix(".part")
-    unfinished.write_text(text, encoding="utf-8")
-    unfinished.replace(path)
+    write_whole(path, text)
     return path
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TextIO
 
+from ..core.files.whole_file import write_whole
 from .errors import BatchError
 from .job import Outcome
 
@@ -45,9 +46,7 @@ def read_logs(paths: Iterable[Path]) -> dict[str, Outcome]:
 
 def write_log(path: Path, outcomes: Iterable[Outcome]) -> None:
     """Write a log anew; the file appears complete."""
-    unfinished = path.with_suffix(".part")
-    unfinished.write_text("".join(f"{outcome.to_line()}\n" for outcome in outcomes), encoding="utf-8")
-    unfinished.replace(path)
+    write_whole(path, "".join(f"{outcome.to_line()}\n" for outcome in outcomes))
 
 
 class ResultsLog:

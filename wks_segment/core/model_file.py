@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -12,6 +11,7 @@ from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
+from .files.whole_file import write_whole
 from .labeling.region_atlas import RegionAtlas
 from .labeling.traits import FIELDS, PLANES
 from .learning.gaussian_mixture import CovarianceType, GaussianMixture
@@ -336,7 +336,7 @@ def _damaged(reason: Message) -> ModelFileError:
 
 
 def write(path: str | PathLike[str], text: str) -> None:
-    """Write text to a file; if this fails half-way, an older file is left as it was.
+    """Write text to a file, which appears whole; if this fails, an older file is left as it was.
 
     Raises
     ------
@@ -354,17 +354,7 @@ def write(path: str | PathLike[str], text: str) -> None:
                 most=MAX_BYTES / 2**20,
             )
         )
-    target = Path(path).resolve()
-    if target.exists() and not os.access(target, os.W_OK):
-        raise PermissionError(Message("{path} is write-protected", path=target))
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-    try:
-        with temporary.open("x", encoding="utf-8") as file:
-            file.write(text)
-        os.replace(temporary, target)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
+    write_whole(path, text)
 
 
 def read(path: str | PathLike[str]) -> str:

@@ -278,8 +278,6 @@ GERMAN_MESSAGES = {
     '"{name}" has no face sets: draw some in Sculpt Mode, or let segments write theirs': '"{name}" hat keine Face Sets: welche im Sculpt-Modus zeichnen oder die der Segmente schreiben',
     '"{name}" has no materials: assign some, or let segments write theirs': '"{name}" hat keine Materialien: welche zuweisen oder die der Segmente schreiben',
     '"{name}" has no vertex groups: add some, or let segments write theirs': '"{name}" hat keine Vertexgruppen: welche hinzufügen oder die der Segmente schreiben',
-    "{path}: cannot write the image": "{path}: das Bild kann nicht geschrieben werden",
-    "{path}: cannot write the image: {reason}": "{path}: das Bild kann nicht geschrieben werden: {reason}",
     # Files of models.
     "{file} was not loaded: {reason}": "{file} wurde nicht geladen: {reason}",
     "The model was not saved: {reason}": "Das Modell wurde nicht gespeichert: {reason}",
@@ -323,7 +321,7 @@ GERMAN_MESSAGES = {
     "the number of a part": "die Nummer eines Teils",
     # Other files.
     "{path}: Blender cannot read it: {reason}": "{path}: Blender kann sie nicht lesen: {reason}",
-    "{path}: it could not be written": "{path}: sie konnte nicht geschrieben werden",
+    "{path}: the folder {folder} is not writable: take another one, or ask whom it belongs to": "{path}: in den Ordner {folder} darf nicht geschrieben werden: nimm einen anderen, oder frage, wem er gehört",
     "{path}: it could not be written: {reason}": "{path}: sie konnte nicht geschrieben werden: {reason}",
     "{path}: the folder {folder} does not exist": "{path}: den Ordner {folder} gibt es nicht",
     "{path}: this is a folder, give the name of a file": "{path}: das ist ein Ordner, den Namen einer Datei angeben",
