@@ -15,6 +15,7 @@ from ...core.progress import Progress
 from ..errors import UserError
 from ..streams import flush_streams
 from .commands import apply, bake, batch, demo, rank, segment
+from .resource_limits import within_limits
 from .results import result_text
 from .terminal import only_result_on_stdout, terminal_progress
 
@@ -77,7 +78,7 @@ def _ended(options: argparse.Namespace) -> tuple[int, dict[str, Any], str]:
     """Run a command; its exit code, its result or the reason why there is none, and the result as text."""
     try:
         with terminal_progress() as progress:
-            result = options.run(options, progress)
+            result = options.run(options, within_limits(progress, options))
         code = int(bool(result.get("failed")))  # files of a batch
         return code, result, "" if options.json else options.text(result)
     except UsageError as error:
@@ -127,7 +128,7 @@ def answer(arguments: list[str]) -> Answer:
     """Run one command of a batch in this process, without output on the terminal."""
     try:
         options = _parser().parse_args(arguments)
-        return Answer(_strictly(options.run(options, Progress())))
+        return Answer(_strictly(options.run(options, within_limits(Progress(), options))))
     except UsageError as error:
         return Answer(None, f"wrong usage: {error}")
     except Exception as error:
