@@ -21,8 +21,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..core.files.whole_file import has_no_space
 from .child_main import READY_FILE, Answer
-from .errors import BatchEndedError, BatchError
+from .errors import BatchEndedError, BatchError, disk_full_error
 from .limits import resident_memory
 
 CHILD_COMMAND = "batch-child"
@@ -115,7 +116,7 @@ class ChildProcess:
         BatchEndedError
             If the batch was ended meanwhile.
         BatchError
-            If no child can be started at all.
+            If no child can be started at all, or its folder is full.
         """
         if self._n_calls >= MAX_CALLS:
             self.close()
@@ -129,7 +130,7 @@ class ChildProcess:
         except OSError:
             process.wait()  # it crashed while it was idle: `_wait_for` reports that
         answer = self._wait_for(self._folder / str(self._n_calls), process, seconds)
-        return Answer(answer["result"], answer["error"])
+        return Answer(**answer)
 
     def close(self) -> None:
         """Let an idle process end by itself; kill it if it does not."""
@@ -181,6 +182,8 @@ class ChildProcess:
                 answer.unlink()
                 return content
             if has_ended:
+                if has_no_space(self._folder):
+                    raise disk_full_error(f"{self._folder}: the folder for temporary files is full")
                 reason = f"its process {_describe_exit(process.returncode)}{self._printed()}"
                 self._forget()
                 raise ChildError(reason, may_retry=used_before)

@@ -15,7 +15,7 @@ from pathlib import Path
 from distributed import Client, KilledWorker, Worker, WorkerPlugin, as_completed, get_worker
 
 from .child_process import ChildProcess, python_program
-from .errors import BatchEndedError, BatchError
+from .errors import BatchEndedError, BatchError, DiskFullError
 from .job import Job, Outcome
 from .limits import Limits
 from .run_job import run_job
@@ -61,6 +61,8 @@ def run_jobs(jobs: Sequence[Job], scheduler: str, limits: Limits, unfinished: Pa
             for future in as_completed(list(futures)):
                 job = futures.pop(future)
                 failure = future.exception()
+                if isinstance(failure, DiskFullError):
+                    raise failure
                 yield future.result() if failure is None else _lost(job, failure)
                 future.release()  # or the scheduler would keep all results
         finally:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from ...batch import CHILD_COMMAND, Answer, serve
+from ...core.files.whole_file import is_disk_full
 from ...core.progress import Progress
 from ..errors import UserError
 from ..streams import flush_streams
@@ -65,12 +66,15 @@ def run(arguments: list[str]) -> int:
         if as_json:
             print(json.dumps(result))
         return code
-    with only_result_on_stdout() as stdout:
-        code, result, text = _ended(options)
-        if as_json:
-            print(json.dumps(_strictly(result), default=str), file=stdout)
-        elif text:
-            print(text, file=stdout)
+    try:
+        with only_result_on_stdout() as stdout:
+            code, result, text = _ended(options)
+            if as_json:
+                print(json.dumps(_strictly(result), default=str), file=stdout)
+            elif text:
+                print(text, file=stdout)
+    except OSError as error:
+        return _failure(f"the result cannot be printed: {error.strerror}")[0]
     return code
 
 
@@ -108,8 +112,9 @@ def reason_of(error: BaseException) -> str | None:
     """What an error tells a user; None if it was not foreseen, so that only its traceback says where it is from."""
     if isinstance(error, UserError):
         return str(error)
-    if isinstance(error, OSError) and error.filename is not None and error.strerror:
-        return f"{error.filename}: {error.strerror}"
+    if isinstance(error, OSError) and error.strerror:
+        name = "a file cannot be read or written" if error.filename is None else error.filename
+        return f"{name}: {error.strerror}"
     if isinstance(error, MemoryError):
         return "there is not enough memory: take fewer poses or eigenpairs, or end other programs"
     return None
@@ -135,7 +140,7 @@ def answer(arguments: list[str]) -> Answer:
         reason = reason_of(error)
         if reason is None:
             raise
-        return Answer(None, reason)
+        return Answer(None, reason, is_disk_full(error))
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -86,9 +86,14 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
 
 def incomplete(path: Path, reason: str = INCOMPLETE) -> OSError:
     """The error of a file that is not complete, though no error said so: that the disk is full, or another reason."""
-    if path.parent.is_dir() and shutil.disk_usage(path.parent).free < NO_SPACE:
+    if has_no_space(path.parent):
         return OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
     return OSError(errno.EIO, reason, str(path))
+
+
+def has_no_space(folder: Path) -> bool:
+    """Whether the disk of a folder is full."""
+    return folder.is_dir() and shutil.disk_usage(folder).free < NO_SPACE
 
 
 def is_disk_full(error: BaseException | None) -> bool:
