@@ -7,7 +7,6 @@ import json
 import math
 import sys
 import traceback
-from pathlib import Path
 from typing import Any, NoReturn
 
 from ...batch import CHILD_COMMAND, Answer, serve
@@ -16,6 +15,7 @@ from ...core.progress import Progress
 from ..errors import UserError
 from ..streams import flush_streams
 from .commands import apply, bake, batch, demo, rank, segment
+from .option_types import named_path
 from .resource_limits import within_limits
 from .results import result_text
 from .terminal import only_result_on_stdout, terminal_progress
@@ -149,7 +149,7 @@ def _parser() -> argparse.ArgumentParser:
     for module in COMMAND_MODULES:
         module.add(commands)
     child = commands.add_parser(CHILD_COMMAND)  # not in the help: a batch starts its children with it
-    child.add_argument("folder", type=Path)
+    child.add_argument("folder", type=named_path)
     child.set_defaults(run=_serve, text=_no_text)
     for command in commands.choices.values():
         command.add_argument("--json", action="store_true", help="print one JSON object")

@@ -74,7 +74,7 @@ def whole_file(
 
 def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
     """Write text, in UTF-8, or bytes to a file that appears whole; OSError, which names it, if that fails."""
-    data = content.encode("utf-8", "surrogateescape") if isinstance(content, str) else content
+    data = content.encode() if isinstance(content, str) else content
 
     def check(written: Path) -> None:
         if written.stat().st_size != len(data):
