@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 
 
 def main() -> None:
     """Run the command line and end the process with its exit code."""
     try:
-        import bpy  # noqa: F401
+        with _ended_by_ctrl_c():
+            import bpy  # noqa: F401
 
-        from . import blender
-        from .blender.cli.main import run
+            from . import blender
+            from .blender.cli.main import run
 
-        blender.register()
+            blender.register()
         code = run(sys.argv[1:])
         blender.unregister()
     except SystemExit as end:  # argparse, after the help
@@ -25,8 +29,36 @@ def main() -> None:
         code = _failed_to_start(error)
     sys.stdout.flush()
     sys.stderr.flush()
+    _remove_temporary_folder()
     # Some versions of bpy crash or hang at a normal exit.
     os._exit(code)
+
+
+@contextmanager
+def _ended_by_ctrl_c() -> Iterator[None]:
+    """Have Ctrl+C end the process at once: an exception would leave a half-loaded Blender, which crashes later."""
+    handler = signal.getsignal(signal.SIGINT)
+    if handler != signal.SIG_IGN:
+        signal.signal(signal.SIGINT, _end)
+    yield
+    if handler != signal.SIG_IGN:
+        signal.signal(signal.SIGINT, handler)
+
+
+def _end(number: int, frame: object) -> None:
+    """End the process; writes without the buffers of Python, which may be in use."""
+    os.write(2, b"wks_segment: interrupted\n")
+    if "--json" in sys.argv:
+        os.write(1, b'{"error": "interrupted"}\n')
+    _remove_temporary_folder()
+    os._exit(130)  # `cli.main.INTERRUPTED`, which is not loaded yet
+
+
+def _remove_temporary_folder() -> None:
+    """Remove Blender's folder for temporary files, which it makes when it is loaded, if it is empty."""
+    folder = getattr(getattr(sys.modules.get("bpy"), "app", None), "tempdir", "")
+    with suppress(OSError):
+        os.rmdir(folder)
 
 
 def _failed_to_start(error: BaseException) -> int:

@@ -1,7 +1,6 @@
 """A batch: a failing file costs only itself, nothing is lost, done twice or overwritten."""
 
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -204,8 +203,8 @@ def test_a_folder_for_temporary_files_that_is_full(batch, small_disk, monkeypatc
 
 def test_a_folder_that_is_deleted_while_the_batch_runs(batch, tmp_path):
     def delete(stage, share):
-        if share > 0:
-            shutil.rmtree(tmp_path / "out")
+        if share > 0:  # at once: a child writes to it meanwhile
+            (tmp_path / "out").rename(tmp_path / "gone")
 
     with pytest.raises(BatchError, match="out: the folder was deleted while the batch was running"):
         batch({"a": "one", "b": "two", "c": "three"}, processes=1).run(Progress(delete))
@@ -256,7 +255,11 @@ def test_a_part_without_files_is_refused(batch):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has other signals")
-def test_ctrl_c_ends_the_children_and_says_how_to_continue(batch, tmp_path):
+@pytest.mark.parametrize("before", [signal.default_int_handler, signal.SIG_IGN], ids=["usual", "ignored"])
+def test_ctrl_c_ends_the_children_and_says_how_to_continue(batch, tmp_path, before, request):
+    """Also where the shell ignores it, as under nohup."""
+    outside = signal.signal(signal.SIGINT, before)
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, outside or signal.SIG_DFL))
     pids, handler = [], signal.getsignal(signal.SIGINT)
 
     def interrupt(stage, share):

@@ -47,6 +47,8 @@ ONE_THREAD = {
     "LP_NUM_THREADS": "1",  # Mesa, which renders pictures without a graphics card
 }
 """Environment of children: each core has a child of its own, and libraries read these variables when they load."""
+TEMPORARY = ("TMPDIR", "TMP", "TEMP")
+"""Variables that name the folder for temporary files."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +159,9 @@ class ChildProcess:
             with open(self._folder / "printed", "wb") as printed:
                 process = subprocess.Popen(
                     command, stdin=subprocess.PIPE, stdout=printed, stderr=printed,
-                    env={**os.environ, **ONE_THREAD, **dict(self.program.environment)},
+                    # Temporary files go with the folder, however the process ends.
+                    env=os.environ | ONE_THREAD | dict.fromkeys(TEMPORARY, str(self._folder))
+                    | dict(self.program.environment),
                     # Ctrl+C reaches only the parent, which ends its children.
                     start_new_session=True, creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
                 )  # fmt: skip

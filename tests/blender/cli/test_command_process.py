@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -41,6 +42,36 @@ def test_process_that_fails_ends_with_1(tmp_path):
     """With 2 after wrong usage: test_recipes.py, and test_command_failures.py within one process."""
     done = ended(process("segment", tmp_path / "missing.glb", "--json"))
     assert (done.code, list(done.result)) == (1, ["error"])
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("--help",), ("segment", "missing.glb"),
+     ("learn", "{walker}", "--frames", "2", "--model", "{out}/model.json", *QUICK),
+     ("batch", "learn", "{walker}", "--frames", "2", "--output", "{out}/models", *QUICK)],
+    ids=lambda arguments: arguments[0],
+)  # fmt: skip
+def test_no_process_leaves_temporary_files(folder, tmp_path, arguments):
+    for name in ("temporary", "out"):
+        (tmp_path / name).mkdir()
+    given = [str(each).format(walker=folder / "walker.blend", out=tmp_path / "out") for each in arguments]
+    done = ended(process(*given, env=os.environ | {"TMPDIR": str(tmp_path / "temporary")}))
+    assert done.code == (1 if "missing.glb" in arguments else 0), done
+    assert not list((tmp_path / "temporary").iterdir())
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT to send to another process")
+@pytest.mark.parametrize("seconds", [0.2, 0.6, 1.0, 1.5, 2.0])
+def test_ctrl_c_while_blender_loads(tmp_path, seconds):
+    heed_signal = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.default_int_handler)}
+    running = process("segment", tmp_path / "missing.glb", "--json", **heed_signal)
+    time.sleep(seconds)
+    running.send_signal(signal.SIGINT)
+    done = ended(running)
+    assert (done.code, done.result) in [
+        (130, {"error": "interrupted"}), (1, {"error": f"{tmp_path / 'missing.glb'}: there is no such file"}),
+    ], done  # fmt: skip
+    assert "Traceback" not in done.err
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT to send to another process")
