@@ -28,8 +28,8 @@ from .limits import resident_memory
 
 CHILD_COMMAND = "batch-child"
 """Command of the command line that runs `child_main.serve`."""
-POLL_SECONDS = 0.05
-"""Time between two checks of a child."""
+POLL_SECONDS, POLL_SHARE = (0.002, 0.05), 0.05
+"""Shortest and longest time between two checks of a child, and their share of the time that a call has taken so far."""
 START_SECONDS = 180.0
 """Time limit for the start of a child; Blender on a slow network drive takes long."""
 EXIT_SECONDS = 5.0
@@ -177,7 +177,7 @@ class ChildProcess:
 
     def _wait_for(self, answer: Path, process: subprocess.Popen[bytes], seconds: float) -> dict[str, Any]:
         """Content of a file that the child writes; ChildError or BatchEndedError if it is not written."""
-        deadline = time.monotonic() + seconds
+        begun = time.monotonic()
         used_before = self._n_calls > 1
         while True:
             has_ended = process.poll() is not None  # before the look for the answer, which it may have written last
@@ -194,7 +194,8 @@ class ChildProcess:
             if self.is_ended():
                 self.kill()
                 raise BatchEndedError
-            if time.monotonic() > deadline:
+            passed = time.monotonic() - begun
+            if passed > seconds:
                 self.kill()
                 raise ChildError(f"it took more than {seconds:g} seconds and was ended; see --time-limit")
             if resident_memory(process.pid) > self.memory:
@@ -202,7 +203,7 @@ class ChildProcess:
                 reason = f"it took more than {self.memory / 1e9:.1f} GB of memory and was ended; see --memory-limit"
                 raise ChildError(reason, may_retry=used_before)
             try:
-                process.wait(POLL_SECONDS)
+                process.wait(min(max(POLL_SHARE * passed, POLL_SECONDS[0]), POLL_SECONDS[1]))
             except subprocess.TimeoutExpired:
                 continue
 

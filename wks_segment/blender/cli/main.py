@@ -7,6 +7,7 @@ import json
 import math
 import sys
 import traceback
+from functools import cache
 from typing import Any, NoReturn
 
 from ...batch import CHILD_COMMAND, Answer, serve
@@ -143,6 +144,7 @@ def answer(arguments: list[str]) -> Answer:
         return Answer(None, reason, is_disk_full(error))
 
 
+@cache  # it takes 25 ms, as long as the rest of a refused file in a batch
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="wks_segment", description="The same parts, labels and colors in every pose of a character.")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
