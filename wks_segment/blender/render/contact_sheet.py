@@ -196,6 +196,7 @@ def render(scene: bpy.types.Scene, path: Path, width: int, height: int, light: s
     temporary = Path(tempfile.mkdtemp()) / "picture.png"
     scene.render.filepath = str(temporary)
     scene.view_settings.view_transform = "Standard"
+    scene.display.render_aa = "5"  # 8 samples look the same and take half as long again without a graphics card
     shading = scene.display.shading
     shading.light, shading.color_type = light, "VERTEX"
     shading.show_cavity = light == "STUDIO"
