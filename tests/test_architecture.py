@@ -132,6 +132,29 @@ def test_no_pickle_eval_or_swallowed_error():
         assert not {target[0] for target, _ in imports(path)} & {"pickle", "shelve", "marshal"}, path
 
 
+WRITERS = {
+    "core/files/whole_file.py",
+    "blender/scene/file_formats.py",  # within a whole file
+    "batch/results_log.py",  # appends lines, each of them whole
+    "batch/child_main.py",  # answers, in a temporary folder
+    "batch/child_process.py",  # what a child prints, in a temporary folder
+}
+
+
+def test_files_are_written_by_one_module():
+    """So that a full disk leaves what was there before."""
+    for path in PACKAGE.rglob("*.py"):
+        if path.relative_to(PACKAGE).as_posix() in WRITERS:
+            continue
+        for node in ast.walk(tree_of(path)):
+            if not isinstance(node, ast.Call):
+                continue
+            name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            modes = {each.value for each in node.args if isinstance(each, ast.Constant)} & {"w", "x", "a", "wb", "xb"}
+            assert name not in {"write_text", "write_bytes"}, f"{path}:{node.lineno}"
+            assert name != "open" or not modes, f"{path}:{node.lineno}"
+
+
 def test_one_module_reads_and_writes_arrays_of_blender():
     """`foreach_get` and `foreach_set` are fast only with an array of the property's type, which the wrappers give."""
     for path in (PACKAGE / "blender").rglob("*.py"):
