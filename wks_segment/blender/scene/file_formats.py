@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
+import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import bpy
 
-from ...core.files.whole_file import incomplete, whole_file
+from ...core.files.whole_file import incomplete, no_space, whole_file
 from ...core.message import Message, message_of
 from ..errors import UserError
 from ..streams import silent
@@ -186,7 +189,21 @@ def _export(path: Path) -> None:
     try:
         EXPORTERS[path.suffix.lower()](str(path))
     except RuntimeError as error:
+        if path.suffix.lower() == ".blend" and not path.exists() and _is_larger_than_space(path.parent):
+            raise no_space(path) from error
         raise incomplete(path, _reason(str(error))) from error
+
+
+def _is_larger_than_space(folder: Path) -> bool:
+    """Whether the scene does not fit on the disk of a folder.
+
+    Blender before 5.0 removes the piece that it has written to a full disk, and says that the file does not exist.
+    """
+    with tempfile.TemporaryDirectory() as elsewhere, suppress(RuntimeError):
+        copy = Path(elsewhere) / "scene.blend"
+        EXPORTERS[".blend"](str(copy))
+        return copy.stat().st_size > shutil.disk_usage(folder).free
+    return False
 
 
 def _save_obj(path: Path) -> None:

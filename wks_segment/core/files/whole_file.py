@@ -86,9 +86,12 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
 
 def incomplete(path: Path, reason: str = INCOMPLETE) -> OSError:
     """The error of a file that is not complete, though no error said so: that the disk is full, or another reason."""
-    if has_no_space(path.parent):
-        return OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
-    return OSError(errno.EIO, reason, str(path))
+    return no_space(path) if has_no_space(path.parent) else OSError(errno.EIO, reason, str(path))
+
+
+def no_space(path: Path) -> OSError:
+    """The error of a file for which there is no space on the disk."""
+    return OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 
 
 def has_no_space(folder: Path) -> bool:
