@@ -16,7 +16,9 @@ import shutil
 import subprocess
 import sys
 import time
+import uuid
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +30,9 @@ from benchmarks.shapes import body
 SETTINGS = ("--eigenpairs", "30", "--energies", "20", "--segments", "4")
 N_VERTICES = 162
 CHILD = "batch-child"
-"""Argument by which the processes of children are known."""
+"""Argument of the processes of children."""
+MARK = "WKS_SEGMENT_BENCHMARK"
+"""Variable of the environment that children inherit from this benchmark, which kills no others."""
 LONGEST_PAUSE = 8.0
 """Most seconds from one kill to the next: a child starts in two."""
 RETRIES = 20
@@ -44,6 +48,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--output", type=Path, default=Path("demo/small_batches"))
     options = parser.parse_args()
+    os.environ[MARK] = uuid.uuid4().hex
     shutil.rmtree(options.output, ignore_errors=True)
     inputs = options.output / "in"
     inputs.mkdir(parents=True)
@@ -142,8 +147,13 @@ def batch(inputs: Path, model: Path, out: Path, *arguments: str) -> subprocess.P
 
 
 def children() -> list[psutil.Process]:
-    """All children of batches on this machine."""
-    return [each for each in psutil.process_iter(["cmdline"]) if CHILD in (each.info["cmdline"] or ())]
+    """The children of the batches that this benchmark has started, also those that have lost their parent."""
+    found = []
+    for each in psutil.process_iter(["cmdline"]):
+        with suppress(psutil.Error):
+            if CHILD in (each.info["cmdline"] or ()) and each.environ().get(MARK) == os.environ[MARK]:
+                found.append(each)
+    return found
 
 
 def resident(process: psutil.Process) -> int:

@@ -1,11 +1,13 @@
 """Batches with Dask: a real scheduler and two workers on this machine, one of which is killed during the batch."""
 
+import contextlib
 import json
 import os
 import re
 import subprocess
 import sys
 import time
+import uuid
 
 import psutil
 import pytest
@@ -15,6 +17,8 @@ from wks_segment.batch import BatchError
 from wks_segment.core.progress import Progress
 
 FILES = 4
+MARK = "WKS_SEGMENT_TEST"
+"""Variable of the environment by which the children of a test are known."""
 distributed = pytest.importorskip("distributed")
 
 
@@ -31,8 +35,9 @@ def started(*arguments, until, **environment):
 
 
 @pytest.fixture
-def cluster():
-    """Address of a scheduler, and its two workers."""
+def cluster(monkeypatch):
+    """Address of a scheduler, its two workers, and the scheduler."""
+    monkeypatch.setenv(MARK, uuid.uuid4().hex)
     processes = []
     try:
         scheduler, address = started(
@@ -77,8 +82,13 @@ def test_nothing_is_lost_when_a_worker_dies(cluster, tmp_path, needs_bpy):
 
 
 def children():
-    """Processes of batch children on this machine."""
-    return {each.pid for each in psutil.process_iter(["cmdline"]) if "batch-child" in (each.info["cmdline"] or ())}
+    """Processes of the children of this cluster."""
+    found = set()
+    for each in psutil.process_iter(["cmdline"]):
+        with contextlib.suppress(psutil.Error):
+            if "batch-child" in (each.info["cmdline"] or ()) and each.environ().get(MARK) == os.environ[MARK]:
+                found.add(each.pid)
+    return found
 
 
 def wait_until(holds, seconds=40):
@@ -102,13 +112,13 @@ def hanging(tmp_path):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pipes with names")
 def test_a_killed_batch_leaves_no_children_on_the_workers(cluster, hanging, tmp_path, needs_bpy):
-    before, out = children(), tmp_path / "out"
+    out = tmp_path / "out"
     process = start("batch", "learn", hanging, "--output", out, *QUICK, "--no-thumbnails", "--scheduler", cluster[0])
     wait_for_lines(out, 1, process)
-    assert wait_until(lambda: len(children() - before) == 2)
+    assert wait_until(lambda: len(children()) == 2)
     process.kill()
     process.communicate()
-    assert wait_until(lambda: children() <= before), "children are left"
+    assert wait_until(lambda: not children()), "children are left"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pipes with names")
