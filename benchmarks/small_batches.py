@@ -33,7 +33,7 @@ CHILD = "batch-child"
 """Argument of the processes of children."""
 MARK = "WKS_SEGMENT_BENCHMARK"
 """Variable of the environment that children inherit from this benchmark, which kills no others."""
-LONGEST_PAUSE = 8.0
+LONGEST_PAUSE = 6.0
 """Most seconds from one kill to the next: a child starts in two."""
 RETRIES = 20
 """Most times that a batch is resumed after the last kill, for files whose child was killed at its first file."""
@@ -114,14 +114,14 @@ def disturbed(
             killed[victim] += 1
         elif found := children():
             turn.choice(found).kill()
-            killed[victim] += 1
+            killed["child"] += 1
     process.wait()
     rounds = 0
     while rounds < RETRIES and (rounds == 0 or process.returncode):
         process = batch(inputs, model, out, "--resume", "--retry", *scheduler)
         process.wait()
         rounds += 1
-    counts = ", ".join(f"{count} of the kind {name}" for name, count in sorted(killed.items()))
+    counts = ", ".join(f"{name} {count} times" for name, count in sorted(killed.items()))
     print(f"killed: {counts}; resumed {killed['batch'] + rounds} times, {rounds} of them with --retry")
 
 
