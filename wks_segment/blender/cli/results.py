@@ -72,9 +72,7 @@ def save_model(model: PoseSegmentation, path: Path) -> None:
     except ValueError as error:
         raise UserError("{path}: {reason}", path=path, reason=message_of(error)) from error
     except OSError as error:
-        raise UserError(
-            "{path}: the model could not be written: {reason}", path=path, reason=error.strerror or error
-        ) from error
+        raise file_formats.not_written(path, error) from error
 
 
 def result_of(options: argparse.Namespace, report: Report) -> dict[str, Any]:

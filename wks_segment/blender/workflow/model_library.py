@@ -17,6 +17,7 @@ from ...core import ModelFileError, PoseSegmentation
 from ...core.message import message_of
 from ..errors import UserError
 from ..props.settings import WKSSegmentSettings
+from ..scene.file_content import name_of
 from .certainty import certainty_lines
 from .stored_messages import as_json, as_text, restored
 
@@ -154,7 +155,7 @@ def in_folder(folder: str | Path) -> dict[str, Path]:
     path = Path(folder)
     if not str(folder) or not path.is_dir():
         return {}
-    return {file.stem: file for file in sorted(path.glob("*.json"))}
+    return {name_of(file): file for file in sorted(path.glob("*.json"))}
 
 
 def all_of(settings: WKSSegmentSettings) -> Iterator[tuple[str, str]]:

@@ -10,7 +10,7 @@ from typing import Any
 from ....core import MemoryCache, Ranking
 from ....core.progress import Progress
 from ...errors import UserError
-from ...scene import file_formats
+from ...scene import file_content, file_formats
 from ...scene.poses import Pose
 from ...workflow import describing, model_library, pipeline
 from ...workflow.describing import Run
@@ -50,7 +50,7 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     run = Run(Report([]), progress, cache_from(options), options.threads)
     verdict = {}
     if options.models is None:
-        chosen = NamedModel(options.model.stem, model_library.loaded(options.model))
+        chosen = NamedModel(file_content.name_of(options.model), model_library.loaded(options.model))
         poses = read_poses(options, run.report, single=False)
     else:
         models = read_models(options.models, run.report)

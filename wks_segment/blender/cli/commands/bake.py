@@ -24,6 +24,7 @@ from ...workflow.describing import Run
 from ...workflow.pipeline import LabelRequest
 from ...workflow.report import Report
 from ..command_options import BAKE_OPTIONS, add_labeling_settings, add_object, add_settings, settings_from
+from ..option_types import named_path
 from ..reading import read_poses
 from ..results import check_picture, result_of
 
@@ -31,17 +32,17 @@ from ..results import check_picture, result_of
 def add(commands: Any) -> None:
     """Add the command to the subparsers of the command line."""
     bake = commands.add_parser("bake", help="bake the parts in a file, or those that a model finds, to an ID map")
-    bake.add_argument("files", type=Path, nargs=1, metavar="FILE", help=", ".join(file_formats.IMPORTERS))
+    bake.add_argument("files", type=named_path, nargs=1, metavar="FILE", help=", ".join(file_formats.IMPORTERS))
     bake.add_argument(
-        "--output", type=Path, required=True, metavar="PNG",
+        "--output", type=named_path, required=True, metavar="PNG",
         help="write the image to this file; if there are several, each to a file with the name of its object",
     )  # fmt: skip
-    bake.add_argument("--model", type=Path, help="find the parts with this model, even if the file has parts")
+    bake.add_argument("--model", type=named_path, help="find the parts with this model, even if the file has parts")
     add_object(bake)
     bake.add_argument(
         "--unwrap", action="store_true", help="unwrap objects without a UV map by Smart UV Project; see --blend"
     )
-    bake.add_argument("--blend", type=Path, help="also write the scene to this file, with UV maps and images")
+    bake.add_argument("--blend", type=named_path, help="also write the scene to this file, with UV maps and images")
     add_labeling_settings(bake)
     add_settings(bake, BAKE_OPTIONS)
     bake.set_defaults(run=_bake, action=None, frames=None, shape_keys=None, markers=None, actions=None)

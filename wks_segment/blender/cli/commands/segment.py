@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 from ....core.progress import Progress
@@ -13,6 +12,7 @@ from ...workflow.describing import Run
 from ...workflow.report import Report, pose_warnings, segment_warnings
 from ...workflow.segmentation_job import LEARN_SHARE
 from ..command_options import add_outputs, add_poses, add_resources, add_settings, cache_from, settings_from
+from ..option_types import named_path
 from ..reading import read_poses, warn_at_once
 from ..results import check_outputs, label_and_write, result_of, save_model
 
@@ -22,14 +22,14 @@ def add(commands: Any) -> None:
     segment = commands.add_parser("segment", help="learn parts from the poses in files, and write them")
     add_poses(segment)
     add_settings(segment)
-    segment.add_argument("--model", type=Path, help="write the model to this file")
+    segment.add_argument("--model", type=named_path, help="write the model to this file")
     add_outputs(segment)
     add_resources(segment)
     segment.set_defaults(run=_segment)
     learn = commands.add_parser("learn", help="learn a model from the poses in files")
     add_poses(learn)
     add_settings(learn)
-    learn.add_argument("--model", type=Path, required=True, help="write the model to this file")
+    learn.add_argument("--model", type=named_path, required=True, help="write the model to this file")
     add_resources(learn)
     learn.set_defaults(run=_segment, output=None, render=None)
 
