@@ -275,7 +275,7 @@ def scene_snapshot():
         "active": context.view_layer.objects.active and context.view_layer.objects.active.name,
         "frame": (context.scene.frame_current, context.scene.frame_subframe),
         "model": (context.scene.wks_segment.model, context.scene.wks_segment.model_summary),
-        "notes": context.scene.wks_segment.part_notes,
+        "notes": {row.name: row.notes for row in context.scene.wks_segment.label_sets},
         "segments": listed(context.scene.wks_segment),
     }
 

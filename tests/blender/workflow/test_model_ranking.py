@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 import pytest
 from builders import changes, labels_of, limbed, limbed_rigged, mesh_object, scene_snapshot, select
+from live_settings import click
 
 from wks_segment.blender.ui import models_panel
 from wks_segment.blender.workflow import model_library, model_ranking
@@ -67,6 +68,7 @@ def test_best_model_is_applied_by_one_click(two):
 
 def test_applying_a_ranked_model_is_one_undo_step(two):
     OPS.rank()
+    click(bpy.data.objects["Unseen"])
     bpy.ops.ed.undo_push(message="ranked")
     before = scene_snapshot()
     OPS.apply_ranked(index=0)

@@ -42,7 +42,6 @@ class WKS_SEGMENT_OT_clear(BaseOperator, bpy.types.Operator):
         remaining = originals | {obj for obj in context.scene.objects if obj.name in names}
         meshes = {obj.data for obj in remaining if obj.data.library is None}
         n_cleared = sum(clear_labels(mesh, warnings) for mesh in meshes)
-        context.scene.wks_segment.applied = ""
         segment_list.fill(context.scene.wks_segment)
         if not any(obj.type == "MESH" and has_labels(obj.data) for obj in context.scene.objects):
             _report.hide_colors(context)

@@ -31,7 +31,8 @@ class WKS_SEGMENT_OT_save_model(BaseOperator, bpy.types.Operator, ExportHelper):
         path = path if path.suffix else path.with_suffix(self.filename_ext)
         try:
             model = pipeline.stored_model(context.scene.wks_segment)
-            model.part_notes_ = context.scene.wks_segment.notes()
+            settings = context.scene.wks_segment
+            model.part_notes_ = settings.notes().for_model(settings.palette)
             model.save(path)
         except (UserError, ValueError, OSError) as error:
             raise UserError("The model was not saved: {reason}", reason=message_of(error)) from error

@@ -9,11 +9,13 @@ import bpy
 import numpy as np
 
 from ..parts.part_style import Style
+from ..props.label_set import style_of
 from ..scene.attributes import OUR_HIDDEN_ATTRIBUTE, read_face_ints
 from ..scene.vertex_group_access import group_owner
 from .color_attribute import PART_COLORS
 from .face_sets import OWN_FACE_SETS
 from .ledger import MARK, Ledger
+from .origin import origin_of
 from .overrides import BY_HAND, MODEL_LABELS
 from .own_materials import KEYS, OWN_KEYS, OWN_MATERIALS
 from .part_attributes import FACE_ATTRIBUTE, VERTEX_ATTRIBUTE, labels_on
@@ -55,7 +57,7 @@ def adopt(mesh: bpy.types.Mesh) -> None:
 
 def _adopt_groups(mesh: bpy.types.Mesh, ledger: Ledger, parts: list[int]) -> None:
     """Enter the vertex groups that have the name of a part."""
-    styles = [Style(), *(scene.wks_segment.style() for scene in bpy.data.scenes)]
+    styles = [Style(), style_of(origin_of(mesh).labels)]
     part_of_name = {GROUP_NAME.format(style.name_of(part)): part for style in styles for part in parts}
     names, numbers = list(ledger.get("vertex_groups", [])), list(ledger.get("group_parts", []))
     with group_owner(mesh) as owner:

@@ -1,7 +1,8 @@
 """What a person changed of a model's parts: faces assigned by hand, parts merged. New labels leave it as it is.
 
 One face attribute keeps the part that each face was given by hand. Where that, or merged parts, make labels other than
-the model's, another attribute keeps the model's, to go back to.
+the model's, another attribute keeps the model's, to go back to. What was done by hand with another label set, such as
+another number of segments, is kept in an attribute of its own, for the time when the labels are of that set again.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ import bpy
 import numpy as np
 
 from ...core.mesh.triangle_mesh import IntArray
-from ..scene.attributes import read_face_ints, write_attribute
+from ..scene.attributes import new_attribute, read_face_ints, remove_attribute, write_attribute
+from ..scene.vertex_group_access import free_name
 from .ledger import Ledger
 from .output import PartsOfMesh
 from .part_attributes import labels_on
@@ -21,6 +23,10 @@ BY_HAND = "wks_segment_by_hand"
 """Face attribute: 1 more than the part that a face was given by hand; 0, which Blender gives to new faces, is none."""
 MODEL_LABELS = "wks_segment_model"
 """Face attribute: the part that the model gives, where others were written."""
+
+
+OTHER_SETS = "by_hand_of_sets"
+"""Entry of the ledger: names of the attributes with faces by hand of other label sets, by the keys of the sets."""
 
 
 class ModelLabels:
@@ -39,11 +45,13 @@ class ModelLabels:
 class ByHand:
     """The parts that faces were given by hand."""
 
-    keys = ("by_hand",)
+    keys = ("by_hand", OTHER_SETS)
 
     def take_back(self, mesh: bpy.types.Mesh, ledger: Ledger) -> None:
-        """Remove the attribute."""
+        """Remove the attributes."""
         ledger.remove_attribute("by_hand")
+        for name in ledger.get(OTHER_SETS, {}).values():
+            remove_attribute(mesh, name)
 
 
 def by_hand(mesh: bpy.types.Mesh) -> IntArray:
@@ -63,6 +71,25 @@ def keep_by_hand(mesh: bpy.types.Mesh, parts: IntArray) -> None:
         ledger.add_attribute("by_hand", BY_HAND, "INT", "FACE", parts + 1)
     else:
         write_attribute(attribute, parts + 1)
+
+
+def by_hand_of(mesh: bpy.types.Mesh, labels: str) -> IntArray | None:
+    """(p,) part that each polygon was given by hand when the labels were of another set, −1 for none; None if never."""
+    kept = read_face_ints(mesh, dict(Ledger(mesh).get(OTHER_SETS, {})).get(labels, ""))
+    return None if kept is None else kept - 1
+
+
+def keep_by_hand_of(mesh: bpy.types.Mesh, labels: str, parts: IntArray) -> None:
+    """Keep the (p,) parts that polygons were given by hand, −1 for none, for when the labels are of that set again."""
+    ledger = Ledger(mesh)
+    names = dict(ledger.get(OTHER_SETS, {}))
+    remove_attribute(mesh, names.pop(labels, ""))
+    if (parts >= 0).any():
+        names[labels] = new_attribute(mesh, free_name(mesh, f"{BY_HAND}.other"), "INT", "FACE", parts + 1).name
+    if names:
+        ledger[OTHER_SETS] = names
+    else:
+        ledger.remove(OTHER_SETS)
 
 
 def model_labels(mesh: bpy.types.Mesh) -> IntArray | None:

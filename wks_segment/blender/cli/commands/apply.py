@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
 from typing import Any
 
@@ -64,7 +65,9 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     model = chosen.model
     run.report.add_model(model)
     settings = settings_from(options)
-    model_library.add_model(settings, model, chosen.name, [f"From {chosen.name}", f"{model.n_segments_} segments"])
+    model_library.add_model(
+        settings, copy(model), chosen.name, [f"From {chosen.name}", f"{model.n_segments_} segments"]
+    )
     if options.smoothness is not None:
         model.smoothness = settings.smoothness
     pipeline.check_limits(model, poses, settings)

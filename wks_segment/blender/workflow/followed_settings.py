@@ -1,0 +1,49 @@
+"""The settings that labels follow, as a mesh keeps them and as the fields show them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..outputs.origin import origin_of
+from ..props.changes import unheard
+from ..props.label_set import style_of
+from ..props.settings import LABEL_SETTINGS, WKSSegmentSettings
+from . import segment_list
+
+FOLLOWED_SETTINGS = (*LABEL_SETTINGS, "snap_to")
+"""Settings that labels follow."""
+
+
+def values_of(settings: WKSSegmentSettings) -> dict[str, Any]:
+    """Values of the settings that labels follow, as the fields show them."""
+    values = {name: getattr(settings, name) for name in FOLLOWED_SETTINGS}
+    return values | {"snap_to": sorted(values["snap_to"])}
+
+
+def are_alike(values: Mapping[str, Any], others: Mapping[str, Any]) -> bool:
+    """Whether two sets of values give the same labels."""
+    ignored = {"n_segments"} if values.get("auto_segments") else set()
+    return {name: value for name, value in values.items() if name not in ignored} == {
+        name: value for name, value in others.items() if name not in ignored
+    }
+
+
+def show(settings: WKSSegmentSettings, values: Mapping[str, Any]) -> None:
+    """Show values in the fields; those that are missing, as in files of version 0.1.0, stay as they are."""
+    with unheard():
+        for name in FOLLOWED_SETTINGS:
+            if name in values:
+                setattr(settings, name, set(values[name]) if name == "snap_to" else values[name])
+
+
+def follow_active(settings: WKSSegmentSettings) -> None:
+    """Let fields and list show the active object, if they show another one."""
+    subject = segment_list.shown_object(settings)
+    if subject is not None and not subject.data.is_editmode and settings.shown != subject.data.name:
+        origin = origin_of(subject.data)
+        show(settings, origin.settings)
+        with unheard():
+            settings.palette = style_of(origin.labels).palette
+    if subject is None or not subject.data.is_editmode:
+        segment_list.fill(settings)
