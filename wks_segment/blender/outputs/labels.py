@@ -23,7 +23,7 @@ from .joined_meshes import adopt
 from .ledger import Ledger
 from .materials import Materials, template_on
 from .options import DEFAULT_OUTPUTS, OutputOptions
-from .origin import ORIGIN
+from .origin import LABEL_ORIGIN
 from .output import LastingOutput, Output, PartsOfMesh
 from .overrides import ByHand, ModelLabels, by_hand, merge_parts, model_labels
 from .part_attributes import PartAttributes, has_labels, labels_on
@@ -81,7 +81,7 @@ def write_labels(
     ledger = Ledger(mesh)
     for output in reversed(OUTPUTS):
         output.take_back(mesh, ledger)
-    ledger.begin([ORIGIN, *(key for lasting in LASTING_OUTPUTS for key in lasting.keys)])
+    ledger.begin([LABEL_ORIGIN, *(key for lasting in LASTING_OUTPUTS for key in lasting.keys)])
     parts = PartsOfMesh(final, labels, weights, shown, options)
     for output in OUTPUTS:
         output.write(mesh, parts, ledger)

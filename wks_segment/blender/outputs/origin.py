@@ -12,7 +12,7 @@ import bpy
 
 from .ledger import Ledger
 
-ORIGIN = "origin"
+LABEL_ORIGIN = "origin"
 """Entry of the ledger."""
 
 
@@ -45,7 +45,7 @@ class Origin:
 
 def origin_of(mesh: bpy.types.Mesh) -> Origin:
     """Where the labels of a mesh are from; unknown for a mesh without labels, and in files of version 0.1.0."""
-    entry = Ledger(mesh).get(ORIGIN, {})
+    entry = Ledger(mesh).get(LABEL_ORIGIN, {})
     return Origin(
         entry.get("labels", ""), json.loads(entry.get("settings", "{}")), entry.get("job", ""),
         bool(entry.get("transferred", False)),
@@ -54,7 +54,7 @@ def origin_of(mesh: bpy.types.Mesh) -> Origin:
 
 def enter_origin(mesh: bpy.types.Mesh, origin: Origin) -> None:
     """Keep where the labels of a mesh are from."""
-    Ledger(mesh)[ORIGIN] = {
+    Ledger(mesh)[LABEL_ORIGIN] = {
         "labels": origin.labels,
         "settings": json.dumps(dict(origin.settings), sort_keys=True),
         "job": origin.job,

@@ -98,6 +98,16 @@ def model_labels(mesh: bpy.types.Mesh) -> IntArray | None:
     return labels_on(mesh) if kept is None else kept
 
 
+def keep_model_labels(mesh: bpy.types.Mesh, labels: IntArray) -> None:
+    """Keep the (p,) parts that the model gives to a mesh whose labels were drawn."""
+    ledger = Ledger(mesh)
+    ledger.remove_attribute("model_labels")
+    ledger.remove("model_labels")
+    written = labels_on(mesh)
+    if written is not None and not np.array_equal(labels, written):
+        ledger.add_attribute("model_labels", MODEL_LABELS, "INT", "FACE", labels)
+
+
 def merge_parts(labels: IntArray, merged_into: Mapping[int, int]) -> IntArray:
     """(p,) parts, where each part that is merged into another is replaced by that one."""
     replacement = np.arange(max(labels.max(initial=-1), *merged_into, -1) + 1)

@@ -100,10 +100,10 @@ def _carried(old: SetNotes, new: SetNotes, successor: Mapping[int, int], merges:
 def _looks(old: str, new: str, meshes: Sequence[_Change]) -> dict[int, int]:
     """Which color of the palette each segment of a new set has, so that the same parts keep theirs."""
     before = notes_of(old).looks
-    n_segments = _number(new)
+    n_segments = part_ids.number_of(new)
     if old.rpartition("/")[0] == new.rpartition("/")[0]:
         # The same model with another number of segments: segments keep their numbers.
-        same = {segment: segment for segment in range(min(n_segments, _number(old)))}
+        same = {segment: segment for segment in range(min(n_segments, part_ids.number_of(old)))}
     else:
         segments = [
             replace(each, before=part_ids.segments_of(each.before), after=part_ids.segments_of(each.after))
@@ -121,12 +121,6 @@ def _looks(old: str, new: str, meshes: Sequence[_Change]) -> dict[int, int]:
         if look is not None and look != segment:
             looks[segment] = look
     return looks
-
-
-def _number(labels: str) -> int:
-    """Number of segments of a label set, 0 if it is not known."""
-    number = labels.rpartition("/")[2]
-    return int(number) if number.isdecimal() else 0
 
 
 def _carry_faces(

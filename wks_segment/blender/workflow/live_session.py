@@ -20,7 +20,7 @@ from ..outputs.overrides import merge_parts
 from ..parts.part_style import Style
 from ..props.label_set import notes_of, style_of
 from ..props.preferences import preference
-from ..scene.characters import Character, quoted
+from ..scene.characters import Character
 from . import model_library, segment_list
 from .background_job import job_holder, redraw_sidebars
 from .followed_settings import are_alike, show, values_of
@@ -100,7 +100,7 @@ class Session:
 
     def holds(self, scene: bpy.types.Scene) -> bool:
         """Whether all labels that would follow in a scene are from kept jobs."""
-        origins = _followers(scene)
+        origins = self._followers(scene)
         return bool(origins) and all(origin.job in self._kept for origin in origins.values())
 
     def is_current(self, scene: bpy.types.Scene) -> bool:
@@ -108,12 +108,24 @@ class Session:
         subject, now = segment_list.shown_object(scene.wks_segment), values_of(scene.wks_segment)
         if subject is None or scene.wks_segment.shown != subject.data.name:
             return True
-        return all(are_alike(origin.settings, now) for origin in _followers(scene).values())
+        return all(are_alike(origin.settings, now) for origin in self._followers(scene).values())
 
     def can_update(self, scene: bpy.types.Scene) -> bool:
         """Whether there are labels that can be updated to the settings, if need be with new signatures."""
+        return bool(self._followers(scene))
+
+    def _followers(self, scene: bpy.types.Scene) -> dict[bpy.types.Object, Origin]:
+        """The objects whose labels follow the settings: the chosen ones, if their job is kept or their model is there.
+
+        Transferred labels follow nothing.
+        """
         rows = {row.uid for row in scene.wks_segment.models}
-        return any(origin.job in self._kept or origin.model in rows for origin in _followers(scene).values())
+        origins = {obj: origin_of(obj.data) for obj in segment_list.chosen(scene.wks_segment)}
+        return {
+            obj: origin
+            for obj, origin in origins.items()
+            if not origin.transferred and (origin.job in self._kept or origin.model in rows)
+        }
 
     @property
     def is_scheduled(self) -> bool:
@@ -184,7 +196,7 @@ class Session:
             return self.proposed[1]
         asleep: dict[str, list[bpy.types.Object]] = {}
         awake: dict[str, list[bpy.types.Object]] = {}
-        for obj, origin in _followers(scene).items():
+        for obj, origin in self._followers(scene).items():
             group, key = (awake, origin.job) if origin.job in self._kept else (asleep, origin.model)
             group.setdefault(key, []).append(obj)
         jobs = []
@@ -192,15 +204,8 @@ class Session:
             with self._dropping(name):
                 jobs.append(self._kept[name].with_settings(settings, objects))
         for uid, objects in asleep.items():
-            row = model_library.row_of(settings, uid)
-            if row is not None:
-                model = model_library.from_text(model_library.text_of(settings, row))
-                jobs.append(SegmentationJob.applying(context, self.cache, model, objects, uid))
-            elif not jobs:
-                raise UserError(
-                    "The model of {names} is no longer in this file: import it, or learn again",
-                    names=quoted(obj.name for obj in objects),
-                )
+            model = model_library.from_text(model_library.text_of(settings, uid))
+            jobs.append(SegmentationJob.applying(context, self.cache, model, objects, uid))
         if not jobs:
             raise UserError(NOTHING_TO_UPDATE)
         return UpdateJob(jobs)
@@ -271,12 +276,6 @@ class Session:
     def _on_load(self, *_: Any) -> None:
         self.drop()
         self.message = ""
-
-
-def _followers(scene: bpy.types.Scene) -> dict[bpy.types.Object, Origin]:
-    """The objects whose labels follow the settings: the chosen ones with labels of a model, not transferred ones."""
-    origins = {obj: origin_of(obj.data) for obj in segment_list.chosen(scene.wks_segment)}
-    return {obj: origin for obj, origin in origins.items() if origin.model and not origin.transferred}
 
 
 def _bytes_of(job: SegmentationJob) -> int:

@@ -54,7 +54,10 @@ def list_active(settings: WKSSegmentSettings) -> None:
         return
     first, *rest = settings.model_summary.splitlines() or [""]
     counted = re.search(r"(\d+) segments", " ".join(rest))
-    n_segments = int(counted[1]) if counted else from_text(settings.model).n_segments_
+    try:
+        n_segments = int(counted[1]) if counted else from_text(settings.model).n_segments_
+    except UserError:
+        n_segments = 0  # a damaged model is refused when it is used
     row = _add_row(settings, first.removeprefix("From ").removesuffix(" …"), n_segments, "")
     row.uid = identity(settings, settings.model)
 
@@ -70,9 +73,10 @@ def identity(settings: WKSSegmentSettings, text: str, learned_from: str = "", re
     return next(uid for uid in uids if uid not in taken)
 
 
-def text_of(settings: WKSSegmentSettings, row: Any) -> str:
-    """JSON text of the model of a row."""
-    return str(settings.model if row == active_row(settings) else row.model)
+def text_of(settings: WKSSegmentSettings, uid: str) -> str:
+    """JSON text of the model with an identity; empty if there is none."""
+    row = row_of(settings, uid)
+    return "" if row is None else str(settings.model if row == active_row(settings) else row.model)
 
 
 def learned(

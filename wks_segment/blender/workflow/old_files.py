@@ -7,9 +7,8 @@ from typing import Any
 
 import bpy
 
-from ..errors import UserError
 from ..outputs.ledger import Ledger
-from ..outputs.origin import ORIGIN, Origin, enter_origin
+from ..outputs.origin import LABEL_ORIGIN, Origin, enter_origin
 from ..outputs.part_attributes import has_labels
 from ..outputs.part_materials import LABELS_PROPERTY, part_of
 from ..parts.part_style import SetNotes
@@ -31,18 +30,15 @@ def upgrade_labels() -> None:
 
 
 def _is_old(mesh: bpy.types.Mesh) -> bool:
-    return has_labels(mesh) and not mesh.is_editmode and ORIGIN not in Ledger(mesh)
+    return has_labels(mesh) and not mesh.is_editmode and LABEL_ORIGIN not in Ledger(mesh)
 
 
 def _name_models(settings: Any) -> None:
     """Give models of an old file their identity, and their notes the key of the labels that they are about."""
+    model_library.list_active(settings)
     used = settings.used_model
-    try:
-        model_library.list_active(settings)
-    except UserError:
-        used = -1  # a damaged model is refused when it is used
     for index, row in enumerate(settings.models):
-        text = settings.model if index == settings.used_model else row.model
+        text = settings.model if index == used else row.model
         if not row.uid and text:
             row.uid = model_library.identity(settings, text)
     for index, row in enumerate(settings.models):

@@ -171,7 +171,8 @@ def rename(settings: WKSSegmentSettings, labels: str, part: int, name: str) -> N
     """
     notes, style = notes_of(labels), style_of(labels)
     siblings = part_ids.siblings_of(part)
-    numbers = {*notes.names, *(item.number for item in settings.segments if item.labels == labels)} - set(siblings)
+    listed = {item.number for item in settings.segments if item.labels == labels}
+    numbers = {*range(part_ids.number_of(labels)), *listed, *notes.names} - set(siblings)
     taken = {style.name_of(number) for number in numbers}
     base = "".join(letter for letter in name if letter.isprintable()).strip()
     new_names = {sibling: _suffixed(base, sibling) for sibling in siblings}

@@ -15,7 +15,8 @@ from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ...core.message import Message, message_of
 from ...core.progress import Progress
 from ..errors import UserError
-from ..outputs.origin import Origin
+from ..outputs.origin import Origin, origin_of
+from ..parts.palette import MAX_COLORS
 from ..props.changes import unheard
 from ..props.settings import WKSSegmentSettings
 from ..scene import poses as reader
@@ -96,7 +97,8 @@ class SegmentationJob:
         """Read poses and settings to learn from; UserError if they cannot be used."""
         settings, report = context.scene.wks_segment, Report([])
         with report.stage("read"):
-            report.poses = read_training_poses(context, settings, report)
+            objects = without_transferred(selected_meshes(context), report)
+            report.poses = read_training_poses(context, settings, report, objects)
         asked = {"FRAMES": settings.pose_count - len(report.left_out), "MARKERS": 1}.get(settings.source)
         report.warn(*report.left_out, *pose_warnings(report.poses, asked))
         return cls._read(context, settings.new_model(), report, cache, learns=True)
@@ -120,7 +122,7 @@ class SegmentationJob:
             model, uid = pipeline.stored_model(settings), model_library.used_uid(settings)
         model.smoothness = settings.smoothness
         number = settings.number()
-        if number not in ("auto", model.n_segments_, model.n_segments):
+        if number not in ("auto", min(model.n_segments_, MAX_COLORS), model.n_segments):
             try:
                 model = model.with_segments(number)
             except ValueError as error:
@@ -128,7 +130,7 @@ class SegmentationJob:
                 with unheard():
                     settings.n_segments = model.n_segments_
         with report.stage("read"):
-            chosen = mesh_objects(objects) if objects else selected_meshes(context)
+            chosen = mesh_objects(objects) if objects else without_transferred(selected_meshes(context), report)
             evaluated = evaluated_objects(context.view_layer)
             disabled = [obj.name for obj in chosen if obj not in evaluated]
             if disabled:
@@ -252,3 +254,16 @@ class SegmentationJob:
             self.uid = labels.rpartition("/")[0]
             return labels
         return model_library.adjusted(settings, self.uid, copy(self.model))
+
+
+def without_transferred(objects: Sequence[bpy.types.Object], report: Report) -> list[bpy.types.Object]:
+    """The objects without those that have another object's segments, if others are among them.
+
+    An outfit is no pose of the body whose segments it has. It is reported.
+    """
+    transferred = [obj for obj in objects if origin_of(obj.data).transferred]
+    if not transferred or len(transferred) == len(objects):
+        return list(objects)
+    names = quoted(obj.name for obj in transferred)
+    report.choices.append(Message("{names}: the transferred segments stay, Clear removes them", names=names))
+    return [obj for obj in objects if obj not in transferred]
