@@ -10,6 +10,7 @@ from bpy.props import IntProperty
 
 from ...core.message import Message
 from ..errors import UserError
+from ..parts import part_ids
 from ..workflow import model_library
 from ..workflow.live_session import session_of
 from ..workflow.model_ranking import ranked_objects
@@ -64,7 +65,7 @@ class WKS_SEGMENT_OT_apply_ranked(LabelOperator, bpy.types.Operator):
             model, file = self.job.model, Path(item.path).name
             summary = [Message("From {names}", names=file), Message("{count} segments", count=model.n_segments_)]
             labels = model_library.add_model(settings, copy(model), item.name, summary)
-            self.job.uid = labels.rpartition("/")[0]
+            self.job.uid = part_ids.model_of(labels)
             # The model is in the scene now, under a name that may have got a number.
             item.name, item.path = settings.models[settings.used_model].name, ""
         return super().write_result(context)

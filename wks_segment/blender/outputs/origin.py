@@ -10,6 +10,7 @@ from typing import Any
 
 import bpy
 
+from ..parts.part_ids import model_of
 from .ledger import Ledger
 
 LABEL_ORIGIN = "origin"
@@ -40,7 +41,7 @@ class Origin:
     @property
     def model(self) -> str:
         """Identity of the model."""
-        return self.labels.rpartition("/")[0]
+        return model_of(self.labels)
 
 
 def origin_of(mesh: bpy.types.Mesh) -> Origin:

@@ -60,6 +60,13 @@ def by_hand(mesh: bpy.types.Mesh) -> IntArray:
     return np.full(len(mesh.polygons), -1) if kept is None else kept - 1
 
 
+def faces_by_hand(mesh: bpy.types.Mesh) -> int:
+    """Number of faces of a mesh that were given a part by hand, in any label set."""
+    kept = (by_hand_of(mesh, labels) for labels in dict(Ledger(mesh).get(OTHER_SETS, {})))
+    given = np.stack([by_hand(mesh), *(parts for parts in kept if parts is not None)]) >= 0
+    return int(given.any(axis=0).sum())
+
+
 def keep_by_hand(mesh: bpy.types.Mesh, parts: IntArray) -> None:
     """Keep the (p,) parts that the polygons of a mesh with labels were given by hand, −1 for none."""
     ledger = Ledger(mesh)

@@ -136,6 +136,7 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         name="Live",
         description="Update the labels at once when a setting of the segments changes, unless that takes long",
         default=True,
+        update=_labels_outdated,
     )
     random_state: IntProperty(
         name="Seed",

@@ -19,11 +19,12 @@ from ..outputs.overrides import by_hand, by_hand_of, keep_by_hand, keep_by_hand_
 from ..parts import part_ids
 from ..parts.palette import MAX_COLORS
 from ..parts.part_style import SetNotes
+from ..props.changes import unheard
 from ..props.label_set import forget_notes, is_known, notes_of, style_of
 from ..props.settings import WKSSegmentSettings
 from ..scene.attributes import Float32Array, read_floats
 from ..scene.characters import Character, polygon_ranges
-from .segment_list import make_part
+from .segment_list import make_part, restyle
 
 SUCCESSOR_OVERLAP = 0.5
 """Common area of an old and a new part, as a share of what they cover together, above which the new part is the old
@@ -61,16 +62,26 @@ def change_sets(settings: WKSSegmentSettings, labels: Mapping[Character, IntArra
             if before is not None and old != new and len(before):
                 change = _Change(obj.data, before, parts[polygons], read_floats(obj.data.polygons, "area"))
                 changes.setdefault(old, []).append(change)
-    notes, known = notes_of(new), is_known(new)
+    before, known = notes_of(new), is_known(new)
+    notes = before
     successors = {old: _successors(meshes) for old, meshes in changes.items()}
     for i, (old, meshes) in enumerate(changes.items()):
-        notes = _carried(notes_of(old), notes, successors[old], merges=not known)
+        # A known set has the names of its own model; what was named with another number of segments is of that, too.
+        if not known or part_ids.model_of(old) == part_ids.model_of(new):
+            notes = _carried(notes_of(old), notes, successors[old], merges=not known)
         if not known and i == 0:
             notes = replace(notes, looks=_looks(old, new, meshes))
-    settings.keep_notes(replace(notes, palette=settings.palette), new)
+    # The palette belongs to the model: labels of a set that is known get its colors.
+    settings.keep_notes(replace(notes, palette=notes.palette or settings.palette), new)
+    with unheard():
+        settings.palette = notes.palette or settings.palette
+    if known and notes != before:
+        restyle(new)
     for old, meshes in changes.items():
+        goes_on = not known or part_ids.model_of(old) == part_ids.model_of(new)
+        to = {**successors[old], **(_made(notes_of(old)) if goes_on else {})}
         for change in {each.mesh: each for each in meshes}.values():
-            _carry_faces(settings, change.mesh, old, new, successors[old])
+            _carry_faces(settings, change.mesh, old, new, to)
 
 
 def forget_unused(settings: WKSSegmentSettings) -> None:
@@ -78,14 +89,13 @@ def forget_unused(settings: WKSSegmentSettings) -> None:
     used = {origin_of(mesh).model for mesh in bpy.data.meshes}
     used |= {row.uid for scene in bpy.data.scenes for row in scene.wks_segment.models}
     for labels in [row.name for row in settings.label_sets]:
-        if labels.rpartition("/")[0] not in used | {""}:
+        if part_ids.model_of(labels) not in used | {""}:
             forget_notes(labels)
 
 
 def _carried(old: SetNotes, new: SetNotes, successor: Mapping[int, int], merges: bool) -> SetNotes:
     """The notes on a new set, with those on the parts of an old one for their successors that have none yet."""
-    made = {part: part for part in (*old.names, *old.colors) if part % part_ids.SIDE_STEP >= part_ids.FIRST_MADE}
-    to = dict(successor) | made
+    to = {**successor, **_made(old)}
     taken = set(new.names.values())
     names = {to[part]: name for part, name in old.names.items() if part in to and name not in taken}
     colors = {to[part]: color for part, color in old.colors.items() if part in to}
@@ -97,11 +107,17 @@ def _carried(old: SetNotes, new: SetNotes, successor: Mapping[int, int], merges:
     )  # fmt: skip
 
 
+def _made(notes: SetNotes) -> dict[int, int]:
+    """The parts that a person made keep their numbers in other sets of the model."""
+    parts = (*notes.names, *notes.colors)
+    return {part: part for part in parts if part % part_ids.SIDE_STEP >= part_ids.FIRST_MADE}
+
+
 def _looks(old: str, new: str, meshes: Sequence[_Change]) -> dict[int, int]:
     """Which color of the palette each segment of a new set has, so that the same parts keep theirs."""
     before = notes_of(old).looks
     n_segments = part_ids.number_of(new)
-    if old.rpartition("/")[0] == new.rpartition("/")[0]:
+    if part_ids.model_of(old) == part_ids.model_of(new):
         # The same model with another number of segments: segments keep their numbers.
         same = {segment: segment for segment in range(min(n_segments, part_ids.number_of(old)))}
     else:
@@ -123,21 +139,21 @@ def _looks(old: str, new: str, meshes: Sequence[_Change]) -> dict[int, int]:
     return looks
 
 
-def _carry_faces(
-    settings: WKSSegmentSettings, mesh: bpy.types.Mesh, old: str, new: str, successor: Mapping[int, int]
-) -> None:
+def _carry_faces(settings: WKSSegmentSettings, mesh: bpy.types.Mesh, old: str, new: str, to: dict[int, int]) -> None:
     """Keep the faces by hand of the old set, and bring those of the new one.
 
     Where the labels were of the new set before, that is what was there, and in addition what was done by hand since.
+
+    Parameters
+    ----------
+    to
+        Successor of each part; gets those of parts that have none, which are made.
     """
     now, there = by_hand(mesh), by_hand_of(mesh, new)
     arrived = by_hand_of(mesh, AT_ARRIVAL)
     since = now != (-1 if arrived is None else arrived)
-    to = dict(successor)
     for part in np.unique(now[now >= 0]).tolist():
-        if part % part_ids.SIDE_STEP >= part_ids.FIRST_MADE:
-            to[part] = part
-        elif part not in to and (there is None or since[now == part].any()):
+        if part not in to and (there is None or since[now == part].any()):
             to[part] = make_part(settings, new, style_of(old).name_of(part), part // part_ids.SIDE_STEP)
     carried = np.array([to.get(part, -1) for part in now.tolist()], dtype=np.int64)
     keep_by_hand_of(mesh, old, now)

@@ -104,11 +104,15 @@ class Session:
         return bool(origins) and all(origin.job in self._kept for origin in origins.values())
 
     def is_current(self, scene: bpy.types.Scene) -> bool:
-        """Whether labels that would follow are from the current settings, or these are about something else."""
-        subject, now = segment_list.shown_object(scene.wks_segment), values_of(scene.wks_segment)
-        if subject is None or scene.wks_segment.shown != subject.data.name:
+        """Whether the labels of the object that the fields are about are from the current settings.
+
+        Others that are selected follow with it, but not before a field changes: until then each keeps its own.
+        """
+        settings = scene.wks_segment
+        subject, followers = segment_list.shown_object(settings), self._followers(scene)
+        if subject not in followers or settings.shown != subject.data.name:
             return True
-        return all(are_alike(origin.settings, now) for origin in self._followers(scene).values())
+        return are_alike(followers[subject].settings, values_of(settings))
 
     def can_update(self, scene: bpy.types.Scene) -> bool:
         """Whether there are labels that can be updated to the settings, if need be with new signatures."""

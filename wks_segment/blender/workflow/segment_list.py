@@ -203,8 +203,9 @@ def recolor(settings: WKSSegmentSettings, labels: str, part: int, color: tuple[f
 
 
 def choose_palette(settings: WKSSegmentSettings) -> None:
-    """Give the chosen objects, and those that share their labels, the colors of the palette in the settings."""
-    for labels in dict.fromkeys(origin_of(obj.data).labels for obj in chosen(settings)):
+    """Give the chosen objects, and those that share their model, the colors of the palette in the settings."""
+    models = {origin_of(obj.data).model for obj in chosen(settings)}
+    for labels in [row.name for row in settings.label_sets if part_ids.model_of(row.name) in models]:
         settings.keep_notes(replace(notes_of(labels), palette=settings.palette), labels)
         restyle(labels, name=False)
 
@@ -231,9 +232,9 @@ def make_part(settings: WKSSegmentSettings, labels: str, name: str, side: int = 
     """Add a part to a label set with this name, and a color that no other part has; return its number."""
     notes, style = notes_of(labels), style_of(labels)
     listed = {item.number for item in settings.segments if item.labels == labels}
-    model = labels.rpartition("/")[0]
+    model = part_ids.model_of(labels)
     # No other set of the model has this number either, so that faces by hand mean the same in all of them.
-    others = [notes_of(row.name) for row in settings.label_sets if row.name.rpartition("/")[0] == model]
+    others = [notes_of(row.name) for row in settings.label_sets if part_ids.model_of(row.name) == model]
     taken = {part for each in others for part in (*each.names, *each.colors, *each.looks, *each.joined)} | listed
     for mesh in bpy.data.meshes:
         if has_labels(mesh) and origin_of(mesh).model == model and _is_readable(mesh):

@@ -16,6 +16,7 @@ from ...core.message import Message, message_of
 from ...core.progress import Progress
 from ..errors import UserError
 from ..outputs.origin import Origin, origin_of
+from ..parts import part_ids
 from ..parts.palette import MAX_COLORS
 from ..props.changes import unheard
 from ..props.settings import WKSSegmentSettings
@@ -251,7 +252,7 @@ class SegmentationJob:
             lines = [origin, *self.report.facts[:3], *self.report.choices]
             members = [member.name for pose in self.poses for member in pose.character.members]
             labels = model_library.learned(settings, copy(self.model), lines, members, first_names)
-            self.uid = labels.rpartition("/")[0]
+            self.uid = part_ids.model_of(labels)
             return labels
         return model_library.adjusted(settings, self.uid, copy(self.model))
 
