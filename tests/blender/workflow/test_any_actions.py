@@ -13,6 +13,7 @@ from hypothesis import event, given
 from hypothesis import strategies as st
 from live_settings import click, rest
 
+from wks_segment.blender.outputs.ledger import LEDGER
 from wks_segment.blender.outputs.origin import origin_of
 from wks_segment.blender.outputs.part_attributes import has_labels
 from wks_segment.blender.workflow import followed_settings
@@ -97,6 +98,8 @@ ACTIONS = {
     "smoothness": lambda settings, number: setattr(settings, "smoothness", number / 5),
     "smallest part": lambda settings, number: setattr(settings, "min_share", number / 2),
     "palette": lambda settings, number: setattr(settings, "palette", ("calm", "maximal", "color_blind")[number % 3]),
+    "materials": lambda settings, number: setattr(settings, "write_materials", bool(number % 3)),
+    "groups": lambda settings, number: setattr(settings, "vertex_groups", ("none", "hard", "soft")[number % 3]),
     "live": lambda settings, number: setattr(settings, "live", bool(number % 4)),
     "rename": rename,
     "recolor": recolor,
@@ -154,9 +157,11 @@ def agrees():
             np.testing.assert_allclose(
                 colors_at(obj, part), [np.rint(255 * style.colors_of(np.array(part)))], atol=1, err_msg=name
             )
-            at = np.flatnonzero(labels_of(obj) == part)[0]
-            assert obj.data.materials[obj.data.polygons[at].material_index].name.startswith(style.name_of(part))
-            assert f"WKS {style.name_of(part)}" in obj.vertex_groups
+            if "first_slot" in obj.data[LEDGER]:
+                at = np.flatnonzero(labels_of(obj) == part)[0]
+                assert obj.data.materials[obj.data.polygons[at].material_index].name.startswith(style.name_of(part))
+            if obj.data[LEDGER].get("vertex_groups"):
+                assert f"WKS {style.name_of(part)}" in obj.vertex_groups
     active = bpy.context.view_layer.objects.active
     if active is None or not has_labels(active.data) or not active.select_get():
         return

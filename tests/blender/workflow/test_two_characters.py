@@ -1,5 +1,7 @@
 """Two characters in one scene: nothing changes that is not selected, and nothing by hand is lost."""
 
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 import pytest
@@ -7,8 +9,10 @@ from builders import changes, choose, labels_of, limbed, limbed_rigged, mesh_obj
 from height_bands import RED, activate, colors_at, style_on
 from live_settings import click, rest
 
+from wks_segment.blender.operators import clear as clear_module
 from wks_segment.blender.outputs.origin import origin_of
 from wks_segment.blender.outputs.overrides import by_hand
+from wks_segment.core.progress import Progress
 
 pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
@@ -257,3 +261,93 @@ def test_what_was_drawn_by_hand_stays(man, settings, session):
     assert labels_of(man)[0] >= 500
     OPS.forget_faces()
     assert set(labels_of(man)) == {0, 1}
+
+
+def test_ticked_outputs_are_written_at_once_to_what_is_selected(both, settings, session):
+    man, robot = both
+    other = state_of(robot)
+    click(man)
+    settings.write_face_sets, settings.vertex_groups, settings.write_materials = True, "soft", False
+    rest(session)
+    assert ".sculpt_face_set" in man.data.attributes
+    assert not man.data.materials
+    weights = {round(group.weight, 3) for vertex in man.data.vertices for group in vertex.groups}
+    assert len(weights) > 10, "soft groups, which need the model"
+    assert not changes(other, state_of(robot))
+    click(robot)
+    assert (settings.write_face_sets, settings.vertex_groups, settings.write_materials) == (False, "none", True)
+
+
+def test_ticked_outputs_are_written_at_once_without_a_model(man, settings):
+    learn(man)
+    outfit = limbed("Outfit")
+    select(man, outfit)
+    OPS.transfer()
+    click(outfit)
+    labels = labels_of(outfit)
+    settings.write_seams, settings.write_colors = True, False
+    assert any(edge.use_seam for edge in outfit.data.edges)
+    assert "wks_segment_color" not in outfit.data.attributes
+    np.testing.assert_array_equal(labels_of(outfit), labels)
+
+
+def test_number_typed_during_a_job_is_followed(man, settings, session):
+    learn(man)
+    job = session.job.with_settings(settings)
+    job.compute(Progress())
+    settings.n_segments = 2  # while the job is computed
+    session.write(job)
+    session.follow(bpy.context.scene)
+    assert session.is_scheduled
+    rest(session)
+    assert set(labels_of(man)) == {0, 1}
+    assert settings.n_segments == 2
+
+
+def test_live_follows_after_apply_was_undone(man, settings, session):
+    learn(man)
+    bpy.ops.ed.undo_push(message="learned")
+    settings.live, settings.n_segments = False, 3
+    assert OPS.apply() == {"FINISHED"}
+    bpy.ops.ed.undo_push(message="applied")
+    assert bpy.ops.ed.undo() == {"FINISHED"}
+    settings = bpy.context.scene.wks_segment
+    assert (settings.n_segments, settings.live) == (4, True)
+    settings.n_segments = 2
+    rest(session)
+    assert set(labels_of(bpy.data.objects["Man"])) == {0, 1}
+
+
+def test_list_is_of_the_active_object(both, settings):
+    man, robot = both
+    robot.scale = (9, 9, 9)
+    click(man, robot)
+    alone = [item.share for item in settings.segments]
+    assert sum(alone) == pytest.approx(100, abs=0.01)
+    areas = [sum(face.area for face in man.data.polygons if labels_of(man)[face.index] == part) for part in range(4)]
+    assert alone == pytest.approx([100 * area / sum(areas) for area in areas], rel=1e-3)
+    settings.segments[0].name = "Head"
+    click(robot, man)
+    assert settings.segments[0].name == "Segment 1"
+    click(limbed("Stranger"))
+    assert not settings.segments
+
+
+def test_clear_asks_before_it_takes_faces_by_hand(man, settings, monkeypatch):
+    learn(man)
+    asked, cleared = [], []
+    monkeypatch.setattr(clear_module._report, "has_window", lambda context: True)
+    manager = SimpleNamespace(invoke_confirm=lambda *_, **texts: asked.append(texts) or {"RUNNING_MODAL"})
+    window = SimpleNamespace(
+        window_manager=manager, selected_objects=[man], visible_objects=[man], scene=bpy.context.scene
+    )
+    operator = SimpleNamespace(execute=lambda context: cleared.append(True) or {"FINISHED"})
+    invoke = clear_module.WKS_SEGMENT_OT_clear.invoke
+    assert invoke(operator, window, None) == {"FINISHED"}
+    assert cleared, "there is nothing to ask"
+    choose(man, np.arange(len(man.data.polygons)) < 12)
+    OPS.assign_faces()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert invoke(operator, window, None) == {"RUNNING_MODAL"}
+    assert "12 faces that were assigned by hand" in asked[0]["message"]
+    assert len(cleared) == 1

@@ -90,8 +90,10 @@ def write_labels(
     return final
 
 
-def rewrite_labels(mesh: bpy.types.Mesh, style: Style, merged_into: Mapping[int, int]) -> None:
-    """Write the labels of a mesh again, with all outputs that it has, after a person's changes."""
+def rewrite_labels(
+    mesh: bpy.types.Mesh, style: Style, merged_into: Mapping[int, int], chosen: OutputOptions | None = None
+) -> None:
+    """Write the labels of a mesh again after a person's changes, with all outputs that it has, or with chosen ones."""
     labels, before = model_labels(mesh), labels_on(mesh)
     if labels is None or before is None:
         return
@@ -113,6 +115,9 @@ def rewrite_labels(mesh: bpy.types.Mesh, style: Style, merged_into: Mapping[int,
         seams="seams" in ledger,
         style=style,
     )
+    if chosen is not None:
+        weights = weights if chosen.vertex_groups == "soft" else None
+        options = chosen
     write_labels(mesh, labels, options, merged_into, weights)
 
 

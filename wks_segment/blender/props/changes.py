@@ -24,6 +24,9 @@ class PropertyListener(Protocol):
     def model_renamed(self, settings: Any, row: Any) -> None:
         """A row of the list of models has another name."""
 
+    def outputs_changed(self, settings: Any) -> None:
+        """Something else is to be written of segments."""
+
     def palette_chosen(self, settings: Any) -> None:
         """The user has chosen another palette."""
 
@@ -73,6 +76,9 @@ class _Deaf:
         """Nothing."""
 
     def model_renamed(self, settings: Any, row: Any) -> None:
+        """Nothing."""
+
+    def outputs_changed(self, settings: Any) -> None:
         """Nothing."""
 
     def palette_chosen(self, settings: Any) -> None:

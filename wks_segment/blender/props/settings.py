@@ -74,6 +74,11 @@ def _labels_outdated(settings: WKSSegmentSettings, context: bpy.types.Context) -
     listener().labels_outdated(settings)
 
 
+def _outputs_changed(settings: WKSSegmentSettings, context: bpy.types.Context) -> None:
+    """Called by Blender when something else is to be written of segments."""
+    listener().outputs_changed(settings)
+
+
 def _palette_chosen(settings: WKSSegmentSettings, context: bpy.types.Context) -> None:
     """Called by Blender when another palette is chosen."""
     listener().palette_chosen(settings)
@@ -242,27 +247,31 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
 
     write_colors: BoolProperty(
         name="Colors", description="Write a color attribute with one flat color for each face, and show it",
-        default=True,
+        default=True, update=_outputs_changed,
     )  # fmt: skip
     write_materials: BoolProperty(
         name="Materials",
         description="Add a material slot for each segment. Clear restores the object's own materials",
         default=False,
+        update=_outputs_changed,
     )
     material_template: PointerProperty(
         name="Template",
         description="Material to copy for each segment, with the color in its Base Color or in the RGB node before it",
         type=bpy.types.Material,
+        update=_outputs_changed,
     )
     write_face_sets: BoolProperty(
         name="Face Sets",
         description="Write a sculpting face set for each segment. Clear restores the object's own face sets",
         default=False,
+        update=_outputs_changed,
     )
     write_seams: BoolProperty(
         name="Seams",
         description="Mark the borders of segments as UV seams, in addition to the object's own seams",
         default=False,
+        update=_outputs_changed,
     )
     palette: EnumProperty(
         name="Palette",
@@ -285,6 +294,7 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
             ("soft", "Soft", "Probability of the segment at each vertex; the weights of a vertex sum to 1"),
         ],
         default="none",
+        update=_outputs_changed,
     )
 
     bake_size: IntProperty(

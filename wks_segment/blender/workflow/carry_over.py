@@ -62,8 +62,8 @@ def change_sets(settings: WKSSegmentSettings, labels: Mapping[Character, IntArra
             if before is not None and old != new and len(before):
                 change = _Change(obj.data, before, parts[polygons], read_floats(obj.data.polygons, "area"))
                 changes.setdefault(old, []).append(change)
-    before, known = notes_of(new), is_known(new)
-    notes = before
+    stored, known = notes_of(new), is_known(new)
+    notes = stored
     successors = {old: _successors(meshes) for old, meshes in changes.items()}
     for i, (old, meshes) in enumerate(changes.items()):
         # A known set has the names of its own model; what was named with another number of segments is of that, too.
@@ -75,7 +75,7 @@ def change_sets(settings: WKSSegmentSettings, labels: Mapping[Character, IntArra
     settings.keep_notes(replace(notes, palette=notes.palette or settings.palette), new)
     with unheard():
         settings.palette = notes.palette or settings.palette
-    if known and notes != before:
+    if known and notes != stored:
         restyle(new)
     for old, meshes in changes.items():
         goes_on = not known or part_ids.model_of(old) == part_ids.model_of(new)

@@ -110,13 +110,17 @@ class Session:
         """
         settings = scene.wks_segment
         subject, followers = segment_list.shown_object(settings), self._followers(scene)
-        if subject not in followers or settings.shown != subject.data.name:
+        if subject is None or subject not in followers or settings.shown != subject.data.name:
             return True
         return are_alike(followers[subject].settings, values_of(settings))
 
     def can_update(self, scene: bpy.types.Scene) -> bool:
         """Whether there are labels that can be updated to the settings, if need be with new signatures."""
         return bool(self._followers(scene))
+
+    def leads(self, obj: bpy.types.Object) -> bool:
+        """Whether the labels of an object follow the settings once it is selected."""
+        return obj in self._followers(bpy.context.scene)
 
     def _followers(self, scene: bpy.types.Scene) -> dict[bpy.types.Object, Origin]:
         """The objects whose labels follow the settings: the chosen ones, if their job is kept or their model is there.

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+import bpy
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -19,7 +20,7 @@ from ...core.poses.describe import LEARNING
 from ...core.progress import Progress
 from ...core.spectral.memory import available_memory
 from ..errors import TooLargeError, UserError
-from ..outputs.labels import write_labels
+from ..outputs.labels import rewrite_labels, write_labels
 from ..outputs.marked_edges import marked_pairs
 from ..outputs.options import OutputOptions
 from ..outputs.origin import Origin, enter_origin, origin_of
@@ -65,14 +66,7 @@ class LabelRequest:
         return cls(
             settings.min_share / 100,
             settings.sides,
-            OutputOptions(
-                colors=settings.write_colors,
-                materials=settings.write_materials,
-                template=settings.material_template.name if settings.material_template is not None else "",
-                vertex_groups=settings.vertex_groups,
-                face_sets=settings.write_face_sets,
-                seams=settings.write_seams,
-            ),
+            options_of(settings),
             {
                 character: Body.of(character, marked_pairs(character, settings.snap_to))
                 for character in dict.fromkeys(characters)
@@ -252,6 +246,25 @@ def write_outputs(
         segment_list.fill(settings)
     in_order = part_ids.unique_parts(np.array(list(names.values()), dtype=np.int64))
     report.parts = {name: part for part in in_order for name, number in names.items() if number == part}
+
+
+def options_of(settings: WKSSegmentSettings) -> OutputOptions:
+    """What the settings ask to be written."""
+    return OutputOptions(
+        colors=settings.write_colors,
+        materials=settings.write_materials,
+        template=settings.material_template.name if settings.material_template is not None else "",
+        vertex_groups=settings.vertex_groups,
+        face_sets=settings.write_face_sets,
+        seams=settings.write_seams,
+    )
+
+
+def rewrite_outputs(settings: WKSSegmentSettings, mesh: bpy.types.Mesh) -> None:
+    """Write the labels of a mesh again with the outputs of the settings; soft groups stay, or are hard."""
+    origin = origin_of(mesh)
+    options = replace(options_of(settings), style=style_of(origin.labels))
+    rewrite_labels(mesh, options.style, settings.notes(origin.labels).joined, options)
 
 
 def stored_model(settings: WKSSegmentSettings) -> PoseSegmentation:

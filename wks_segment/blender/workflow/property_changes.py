@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from . import model_library, segment_list
+from . import model_library, pipeline, segment_list
 from .all_or_nothing import all_or_nothing
 from .live_session import session_of
 
@@ -20,6 +20,16 @@ class PropertyChanges:
         subject = segment_list.shown_object(settings)
         settings.shown = "" if subject is None else subject.data.name
         session_of(bpy.context).schedule(settings.id_data)
+
+    def outputs_changed(self, settings: Any) -> None:
+        """Let outputs follow the settings; at once where no model is needed for it."""
+        self.labels_outdated(settings)
+        session = session_of(bpy.context)
+        others = [obj for obj in segment_list.chosen(settings) if not session.leads(obj)]
+        if others and bpy.context.mode == "OBJECT":
+            with all_or_nothing(bpy.context):
+                for mesh in segment_list.meshes_of(others):
+                    pipeline.rewrite_outputs(settings, mesh)
 
     def palette_chosen(self, settings: Any) -> None:
         """Give the selected objects, and those that share their labels, the colors of the palette."""
