@@ -6,12 +6,13 @@ import bpy
 import numpy as np
 import pytest
 from builders import changes, choose, labels_of, limbed, limbed_rigged, mesh_object, select, snapshot
-from height_bands import RED, activate, colors_at, style_on
+from height_bands import RED, activate, colors_at, style_on, write_labels
 from live_settings import click, rest
 
 from wks_segment.blender.operators import clear as clear_module
 from wks_segment.blender.outputs.origin import origin_of
 from wks_segment.blender.outputs.overrides import by_hand
+from wks_segment.blender.scene.characters import Character
 from wks_segment.core.progress import Progress
 
 pytestmark = pytest.mark.usefixtures("scene")
@@ -351,3 +352,25 @@ def test_clear_asks_before_it_takes_faces_by_hand(man, settings, monkeypatch):
     assert invoke(operator, window, None) == {"RUNNING_MODAL"}
     assert "12 faces that were assigned by hand" in asked[0]["message"]
     assert len(cleared) == 1
+
+
+def test_another_count_of_poses_keeps_colors_of_the_same_parts(man, settings):
+    settings.n_segments = 6
+    learn(man)
+    settings.palette = "maximal"
+    # As if the model had numbered its segments otherwise.
+    old = labels_of(man)
+    write_labels(settings, {Character((man,)): (old + 2) % 6}, of="first/6")
+    before = {part: colors_at(man, part) for part in np.unique(labels_of(man)).tolist()}
+    old = labels_of(man)
+    settings.pose_count = 3
+    assert OPS.learn() == {"FINISHED"}
+    now, kept = labels_of(man), 0
+    for part in np.unique(now).tolist():
+        for other in np.unique(old).tolist():
+            if ((now == part) & (old == other)).sum() > 0.6 * ((now == part) | (old == other)).sum():
+                assert colors_at(man, part) == before[other]
+                kept += 1
+    assert kept > 2
+    colors = [tuple(item.color) for item in settings.segments]
+    assert len(set(colors)) == len(colors)

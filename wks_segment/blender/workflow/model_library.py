@@ -16,19 +16,21 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from ...core import ModelFileError, PartNotes, PoseSegmentation
+from ...core import ModelFileError, PartNotes, PoseSegmentation, model_file
 from ...core.message import Message, message_of
 from ..errors import UserError
 from ..parts.part_style import SetNotes
 from ..props.changes import unheard
 from ..props.settings import WKSSegmentSettings
 from .certainty import certainty_lines
-from .stored_messages import as_json, as_text, restored
+from .stored_messages import as_json, as_text, from_json, restored
 
 DEFAULT_MODEL_NAME = "Model"
 """Name of a model without a known origin."""
 MAX_NAME_LETTERS = 60
 """Letters of a model's name; Blender's own names have at most 63 bytes."""
+LEARNED_FROM = "learned_from"
+"""Field of a model file for the lines on what the model was learned from."""
 ROW_STORES = {
     "model": "model",
     "summary": "model_summary",
@@ -228,6 +230,16 @@ def from_text(text: str) -> PoseSegmentation:
         return PoseSegmentation.from_json(text)
     except ValueError as error:
         raise UserError("The model in this file cannot be used: {reason}", reason=message_of(error)) from error
+
+
+def save(model: PoseSegmentation, path: Path, summary: Sequence[str]) -> None:
+    """Write a model to a file, with the lines on what it was learned from; errors as of `PoseSegmentation.save`."""
+    model_file.write(path, json.dumps(json.loads(model.to_json()) | {LEARNED_FROM: as_json(summary)}))
+
+
+def summary_in(path: Path) -> list[str]:
+    """Lines on what the model in a file was learned from; none if the file has none."""
+    return from_json(json.loads(model_file.read(path)).get(LEARNED_FROM))
 
 
 def in_folder(folder: str | Path) -> dict[str, Path]:

@@ -29,8 +29,9 @@ from ..scene.simulations import check_simulations
 from . import describing, model_library, pipeline
 from .describing import Run
 from .followed_settings import values_of
+from .model_ranking import NamedModel, fit_warning, models_of
 from .pipeline import LabelRequest
-from .report import Report, pose_warnings, segment_warnings, shape_warnings
+from .report import Report, absent_warnings, pose_warnings, segment_warnings, shape_warnings
 
 LEARN_SHARE = 0.97
 """Share of the progress of a job that learns before labeling: what takes long is known from learning."""
@@ -71,6 +72,8 @@ class SegmentationJob:
         Identity of the model in the scene; empty as long as it has none.
     name : str
         Name by which meshes know the job.
+    compared
+        The applied model, and the others of the scene that might fit better.
     first : SegmentationJob, optional
         The job that this one repeats with other settings.
     labels
@@ -88,6 +91,7 @@ class SegmentationJob:
     values: dict[str, Any] = field(default_factory=dict)
     uid: str = ""
     name: str = ""
+    compared: list[NamedModel] = field(default_factory=list)
     described: list[Workpiece] = field(default_factory=list)
     first: SegmentationJob | None = None
     labels: dict[Character, IntArray] = field(default_factory=dict)
@@ -142,7 +146,8 @@ class SegmentationJob:
             characters = group(chosen, together=settings.one_character)
             check_simulations(context.scene, characters, over_time=False)
             report.poses = reader.read_objects(context, characters)
-        return cls._read(context, model, report, cache, False, uid)
+        job = cls._read(context, model, report, cache, False, uid)
+        return replace(job, compared=models_of(settings, uid))
 
     @classmethod
     def _read(
@@ -223,6 +228,17 @@ class SegmentationJob:
         self._weights = pipeline.soften(self.model, self.poses, self.described, self.labels, self.request, run)
         if self.learns:
             self.report.warnings += segment_warnings(self.model, self.report)
+        else:
+            self.report.warnings += absent_warnings(self.model, self.report)
+            if self.first is None:
+                self._compare()
+
+    def _compare(self) -> None:
+        """Warn of characters that the model does not fit."""
+        for pose, described in zip(self.poses, self.described, strict=True):
+            if self.compared:
+                warning = fit_warning(self.compared, [described.pose], pose.character.name)
+                self.report.warn(*([] if warning is None else [warning]))
 
     def _describe(self, progress: Progress) -> Progress:
         """Describe the poses, and learn from them if asked to; the progress of the rest."""
