@@ -1,12 +1,14 @@
 """`wks_segment learn` and `apply`: models, and limits of a job."""
 
 import json
+from dataclasses import replace
 
 import bpy
 import pytest
 from builders import labels_of, limbed
 from command_files import QUICK, assert_fails, empty_scene, mesh_of_scene, save
 
+from wks_segment.blender.workflow import model_ranking
 from wks_segment.core import PoseSegmentation
 
 
@@ -88,3 +90,14 @@ def test_a_job_above_the_limits_is_refused_until_they_are_raised(command, folder
     refused = command(*arguments, "--limit-memory", "0.001")
     assert (refused.code, "0.0 GB: raise the limit" in refused.err) == (1, True)
     assert command(*arguments, "--limit-memory", "64", "--limit-minutes", "60").code == 0
+
+
+def test_apply_says_that_a_model_does_not_fit(command, folder, model, tmp_path, monkeypatch):
+    known = model_ranking.rank
+    monkeypatch.setattr(model_ranking, "rank", lambda *given: replace(known(*given), verdict="nothing fits"))
+    options = ("--model", model, "--output", tmp_path / "out.blend", "--smallest-part", 20, "--json")
+    done = command("apply", folder / "pose_0.obj", *options)
+    assert done.code == 0, done
+    warnings = "\n".join(done.result["warnings"])
+    assert '"model" does not fit' in warnings
+    assert "of the model's 4 segments are not on these objects" in warnings

@@ -15,8 +15,8 @@ from ...scene import file_formats
 from ...scene.poses import Pose
 from ...workflow import describing, model_library, pipeline
 from ...workflow.describing import Run
-from ...workflow.model_ranking import NamedModel, largest, rank_poses, verdict_message
-from ...workflow.report import Report
+from ...workflow.model_ranking import NamedModel, fit_warning, largest, rank_poses, verdict_message
+from ...workflow.report import Report, absent_warnings
 from ..command_options import (
     add_labeling_settings,
     add_model,
@@ -73,6 +73,11 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     pipeline.check_limits(model, poses, settings)
     described, rest = describing.describe_to_label(model, poses, run)
     label_and_write(model, poses, described, settings, options, run.with_progress(rest))
+    if options.models is None:
+        for pose, signature in zip(poses, described, strict=True):
+            warning = fit_warning([chosen], [signature.pose], pose.character.name)
+            run.report.warn(*([] if warning is None else [warning]))
+    run.report.warn(*absent_warnings(model, run.report))
     if options.output:
         file_formats.save_scene(options.output)
     return result_of(options, run.report) | verdict
