@@ -43,14 +43,6 @@ def keep_notes(settings: Any, labels: str, notes: SetNotes) -> None:
         row.notes = json.dumps(notes.as_json())
 
 
-def forget_notes(labels: str) -> None:
-    """Remove the notes on a label set that nothing uses."""
-    for settings in _all_settings():
-        index = settings.label_sets.find(labels)
-        if index >= 0:
-            settings.label_sets.remove(index)
-
-
 def style_of(labels: str) -> Style:
     """Names and colors of the parts of a label set."""
     all_settings = _all_settings()

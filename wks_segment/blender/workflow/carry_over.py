@@ -20,7 +20,7 @@ from ..parts import part_ids
 from ..parts.palette import MAX_COLORS
 from ..parts.part_style import SetNotes
 from ..props.changes import unheard
-from ..props.label_set import forget_notes, is_known, notes_of, style_of
+from ..props.label_set import is_known, notes_of, style_of
 from ..props.settings import WKSSegmentSettings
 from ..scene.attributes import Float32Array, read_floats
 from ..scene.characters import Character, polygon_ranges
@@ -82,15 +82,6 @@ def change_sets(settings: WKSSegmentSettings, labels: Mapping[Character, IntArra
         to = {**successors[old], **(_made(notes_of(old)) if goes_on else {})}
         for change in {each.mesh: each for each in meshes}.values():
             _carry_faces(settings, change.mesh, old, new, to)
-
-
-def forget_unused(settings: WKSSegmentSettings) -> None:
-    """Forget the notes on labels that neither a mesh nor a model has."""
-    used = {origin_of(mesh).model for mesh in bpy.data.meshes}
-    used |= {row.uid for scene in bpy.data.scenes for row in scene.wks_segment.models}
-    for labels in [row.name for row in settings.label_sets]:
-        if part_ids.model_of(labels) not in used | {""}:
-            forget_notes(labels)
 
 
 def _carried(old: SetNotes, new: SetNotes, successor: Mapping[int, int], merges: bool) -> SetNotes:
