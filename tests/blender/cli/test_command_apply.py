@@ -1,6 +1,7 @@
 """`wks_segment learn` and `apply`: models, and limits of a job."""
 
 import json
+from dataclasses import replace
 from itertools import count
 from types import SimpleNamespace
 
@@ -11,6 +12,7 @@ from command_files import QUICK, assert_fails, empty_scene, mesh_of_scene, save
 
 from wks_segment.blender.cli import resource_limits
 from wks_segment.blender.cli.main import answer
+from wks_segment.blender.workflow import model_ranking
 from wks_segment.core import PoseSegmentation
 
 
@@ -118,3 +120,14 @@ def test_a_model_that_asks_for_thousands_of_eigenpairs(command, folder, tmp_path
     (tmp_path / "large.json").write_text(json.dumps(content))
     done = command("apply", folder / "pose_0.obj", "--model", tmp_path / "large.json", "--output", tmp_path / "a.blend")
     assert_fails(done, "take about", "minutes", "allowed are 5.0 minutes")
+
+
+def test_apply_says_that_a_model_does_not_fit(command, folder, model, tmp_path, monkeypatch):
+    known = model_ranking.rank
+    monkeypatch.setattr(model_ranking, "rank", lambda *given: replace(known(*given), verdict="nothing fits"))
+    options = ("--model", model, "--output", tmp_path / "out.blend", "--smallest-part", 20, "--json")
+    done = command("apply", folder / "pose_0.obj", *options)
+    assert done.code == 0, done
+    warnings = "\n".join(done.result["warnings"])
+    assert '"model" does not fit' in warnings
+    assert "of the model's 4 segments are not on these objects" in warnings

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from copy import copy
 from typing import Any
 
 from ....core.progress import Progress
@@ -49,12 +50,12 @@ def _segment(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     described = pipeline.learn(model, poses, run.with_progress(run.progress.part(0.0, LEARN_SHARE)))
     if options.model:
         save_model(model, options.model)
-    model_library.store_active(settings)
+    names = [member.name for pose in poses for member in pose.character.members]
+    model_library.learned(settings, copy(model), run.report.facts, names, poses[0].character.name)
     if options.output or options.render:
         rest = run.with_progress(run.progress.part(LEARN_SHARE, 1.0))
-        label_and_write(model, poses, described, settings, options, rest, renumbered=True)
+        label_and_write(model, poses, described, settings, options, rest)
         run.report.warnings += segment_warnings(model, run.report)
-    model_library.keep(settings, model, run.report.facts, poses[0].character.name, add=True)
     if options.output:
         file_formats.save_scene(options.output)
     return result_of(options, run.report)
