@@ -6,6 +6,7 @@ imported only here, and this module is imported only if a scheduler is given.
 
 from __future__ import annotations
 
+import logging
 import queue
 import threading
 import time
@@ -48,6 +49,8 @@ def run_jobs(jobs: Sequence[Job], scheduler: str, limits: Limits, unfinished: Pa
     BatchError
         If the scheduler does not answer, or the disk is full.
     """
+    # Errors are told by the batch; Dask would print the tracebacks of a connection that it gives up as well.
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     try:
         client = Client(scheduler, timeout=CONNECT_SECONDS, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
