@@ -119,13 +119,13 @@ def two(inputs: Path, out: Path) -> dict[str, Any]:
 
 def dask(inputs: Path, out: Path) -> dict[str, Any]:
     """A batch with two Dask workers."""
-    with _cluster() as (address, _):
+    with cluster() as (address, _):
         return _finished(_batch(inputs, out, "--scheduler", address))
 
 
 def killed_worker(inputs: Path, out: Path) -> dict[str, Any]:
     """A batch with two Dask workers, one of which is killed when a third of the files are done."""
-    with _cluster() as (address, workers):
+    with cluster() as (address, workers):
         process = _batch(inputs, out, "--scheduler", address)
         _wait_for(out, len(list(inputs.iterdir())) // 3, process)
         workers[0].kill()
@@ -213,7 +213,7 @@ def _wait_for(out: Path, count: int, process: subprocess.Popen[str]) -> None:
 
 
 @contextmanager
-def _cluster() -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
+def cluster() -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
     """A scheduler on this machine and two workers, which are ended afterward; its address, and the workers."""
     processes: list[subprocess.Popen[str]] = []
 

@@ -62,6 +62,7 @@ TARGETS = {
     ),
 }
 
+README = "README.md"
 REQUIRED_FILES = ("__init__.py", MANIFEST, "LICENSE")
 FILE_TYPES = {".py", ".toml", ".md", ".whl", ".json", ".npz", ".png", ".svg", ".typed"}
 FORBIDDEN_FOLDERS = {"__pycache__", "test", "tests"}
@@ -140,13 +141,29 @@ def manifest_with_wheels(text: str, platform: str, wheels: Sequence[Path]) -> st
     return text
 
 
+def readme_alone(text: str, folder: Path) -> str:
+    """A text in Markdown without pictures and links of files that are not in its folder; the words of links stay."""
+
+    def word(match: re.Match[str]) -> str:
+        is_picture, words, place = match.groups()
+        if re.match(r"[a-z]+:|#", place) or (folder / place.partition("#")[0]).exists():
+            return match[0]
+        return "" if is_picture else words
+
+    text = re.sub(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)", word, text)
+    return re.sub(r"\n{3,}", "\n\n", text)
+
+
 def stage(source: Path, target: Path, platform: str, wheels: Sequence[Path]) -> None:
     """Copy the files that belong in the ZIP to an empty folder, so that nothing else of the checkout is packed."""
     ignore = shutil.ignore_patterns("__pycache__", "*.py[cod]", ".*")
     shutil.copytree(source / PACKAGE, target / PACKAGE, ignore=ignore)
-    for name in (*REQUIRED_FILES, "README.md"):
+    for name in (*REQUIRED_FILES, README):
         if (source / name).exists():
             shutil.copy2(source / name, target / name)
+    if (target / README).exists():
+        text = readme_alone((target / README).read_text(encoding="utf-8"), target)
+        (target / README).write_text(text, encoding="utf-8")
     (target / "wheels").mkdir()
     for wheel in wheels:
         shutil.copy2(wheel, target / "wheels" / wheel.name)

@@ -16,6 +16,9 @@ sys.path.insert(0, str(Path(__file__).parent / "core"))
 sys.path.insert(0, str(Path(__file__).parent / "batch"))
 
 import tally
+from full_disk import small_disk
+
+__all__ = ["small_disk"]  # a fixture
 
 EASY = {"deadline": None, "suppress_health_check": list(HealthCheck), "database": None}
 settings.register_profile("default", max_examples=10, derandomize=True, **EASY)

@@ -16,6 +16,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "wks_segment"
 BLENDERS_OWN = {"bpy", "bmesh", "mathutils", "bpy_extras", "gpu", "blf", "aud"}
 LAYERS = {
     "core": [
+        {"files"},
         {"mesh"},
         {"spectral"},
         {"geometry"},
@@ -129,6 +130,29 @@ def test_no_pickle_eval_or_swallowed_error():
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
                 assert node.func.id not in {"eval", "exec"}, f"{path}:{node.lineno}"
         assert not {target[0] for target, _ in imports(path)} & {"pickle", "shelve", "marshal"}, path
+
+
+WRITERS = {
+    "core/files/whole_file.py",
+    "blender/scene/file_formats.py",  # within a whole file
+    "batch/results_log.py",  # appends lines, each of them whole
+    "batch/child_main.py",  # answers, in a temporary folder
+    "batch/child_process.py",  # what a child prints, in a temporary folder
+}
+
+
+def test_files_are_written_by_one_module():
+    """So that a full disk leaves what was there before."""
+    for path in PACKAGE.rglob("*.py"):
+        if path.relative_to(PACKAGE).as_posix() in WRITERS:
+            continue
+        for node in ast.walk(tree_of(path)):
+            if not isinstance(node, ast.Call):
+                continue
+            name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            modes = {each.value for each in node.args if isinstance(each, ast.Constant)} & {"w", "x", "a", "wb", "xb"}
+            assert name not in {"write_text", "write_bytes"}, f"{path}:{node.lineno}"
+            assert name != "open" or not modes, f"{path}:{node.lineno}"
 
 
 def test_one_module_reads_and_writes_arrays_of_blender():

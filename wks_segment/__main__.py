@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 import traceback
+from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
 
@@ -15,21 +17,23 @@ from .interruption import Interrupted, handled
 def main() -> None:
     """Run the command line and end the process with its exit code."""
     try:
-        with handled(_interrupted_at_start):
+        with handled(_end_at_once):  # a command that runs is ended in its own way
             import bpy  # noqa: F401
 
             from . import blender
             from .blender.cli.main import run
 
             blender.register()
-        code = run(sys.argv[1:])
-        blender.unregister()
+            code = run(sys.argv[1:])
+        with handled(signal.SIG_IGN):  # the command has ended
+            blender.unregister()
     except SystemExit as end:  # argparse, after the help
         code = int(end.code or 0)
     except BaseException as error:
         code = _failed_to_start(error)
     sys.stdout.flush()
     sys.stderr.flush()
+    _remove_temporary_folder()
     # Some versions of bpy crash or hang at a normal exit.
     os._exit(code)
 
@@ -45,17 +49,28 @@ def _failed_to_start(error: BaseException) -> int:
     return 1
 
 
-def _interrupted_at_start(number: int, frame: FrameType | None) -> NoReturn:
-    """End the process; an error would not do, since Blender's own start may catch it."""
-    interruption = Interrupted(number)
-    _tell(str(interruption))
-    os._exit(interruption.code)
+def _end_at_once(number: int, frame: FrameType | None) -> NoReturn:
+    """End the process: an error could be caught by Blender's own start, or leave a half-loaded Blender that crashes."""
+    with handled(signal.SIG_IGN):  # a second signal would be told again
+        interruption = Interrupted(number)
+        _tell(str(interruption))
+        _remove_temporary_folder()
+        os._exit(interruption.code)
 
 
 def _tell(reason: str) -> None:
-    print(f"wks_segment: {reason}", file=sys.stderr, flush=True)
-    if "--json" in sys.argv:
-        print(json.dumps({"error": reason}), flush=True)
+    """Print a reason without the buffers of Python, which may be in use when a signal arrives."""
+    with suppress(OSError):
+        os.write(2, f"wks_segment: {reason}\n".encode(errors="backslashreplace"))
+        if "--json" in sys.argv:
+            os.write(1, f"{json.dumps({'error': reason})}\n".encode())
+
+
+def _remove_temporary_folder() -> None:
+    """Remove Blender's folder for temporary files, which it makes when it is loaded, if it is empty."""
+    folder = getattr(getattr(sys.modules.get("bpy"), "app", None), "tempdir", "")
+    with suppress(OSError):
+        os.rmdir(folder)
 
 
 def _why_not_loaded(error: ImportError) -> str:

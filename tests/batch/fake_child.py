@@ -36,6 +36,8 @@ def run(arguments):
         return child_main.Answer(None, f"{source}: there is no mesh in this file")
     if text == "raise":
         raise RuntimeError("unforeseen")
+    if text == "fill":
+        return child_main.Answer(None, f"{source}: No space left on device", True)
     for argument in rest:
         if argument.startswith("--out"):
             Path(argument.partition("=")[2]).write_text(f"{text} {os.getpid()} {len(calls)}")

@@ -2,15 +2,21 @@
 
 import os
 import signal
+import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from command_line import lines
+from full_disk import files_end_at
 
-from wks_segment.batch import BatchError, Limits, Program, merge_logs
+from wks_segment.batch import BatchError, Limits, Outcome, Program, merge_logs
+from wks_segment.batch.results_log import ResultsLog, read_log
 from wks_segment.core.progress import Progress
+from wks_segment.interruption import interruptible
 
 QUIET = Progress()
 
@@ -148,6 +154,72 @@ def test_the_result_of_another_file_is_not_overwritten(batch, tmp_path):
         batch({"b": "two"}, outputs={"--out": "same.txt"}, resume=True).run(QUIET)
 
 
+def test_a_full_disk_ends_the_batch_and_a_plain_resume_goes_on(batch, tmp_path):
+    texts = {"a": "one", "b": "fill", "c": "three", "d": "four"}
+    with pytest.raises(BatchError, match=r"b: No space left on device: make room .*--resume"):
+        batch(texts, processes=1).run(QUIET)
+    assert [line["name"] for line in lines(tmp_path / "out")] == ["a"]
+    assert not (tmp_path / "out" / ".unfinished").exists()
+    result = batch(texts | {"b": "two"}, processes=1, resume=True).run(QUIET)
+    assert (result["done"], result["now"], result["failed"]) == (4, 3, {})
+
+
+def test_a_disk_that_is_filled_by_results_and_log(batch, tmp_path, small_disk):
+    """Whatever does not fit first: what is listed as done is there and whole, and nothing else is."""
+    texts = {f"{i:03d}": "x" * 5000 for i in range(40)}
+    disk = small_disk(128)
+    out = disk / "out"
+    with pytest.raises(BatchError, match="make room on the disk"):
+        batch(texts, folder=out).run(QUIET)
+    done = [line["name"] for line in lines(out)]
+    assert 5 < len(done) < 40
+    assert sorted(path.stem for path in out.glob("*.txt")) == sorted(done)
+    for name in done:
+        assert (out / f"{name}.txt").read_text().startswith(texts[name])
+    assert {path.name for path in out.iterdir()} <= {f"{name}.txt" for name in done} | {"batch.jsonl", "report.html"}
+    subprocess.run(["mount", "-o", "remount,size=2M", disk], check=True)
+    result = batch(texts, folder=out, resume=True).run(QUIET)
+    assert (result["done"], result["now"]) == (40, 40 - len(done))
+
+
+def test_a_line_that_does_not_fit_leaves_the_log_as_it_was(tmp_path):
+    outcome = Outcome("/in/a", "a", "key", "failed", "why " * 100)
+    with ResultsLog(tmp_path / "batch.jsonl") as log:
+        log.add(outcome)
+        size = log.path.stat().st_size
+        with files_end_at(size + 100), pytest.raises(OSError, match=r"batch\.jsonl"):
+            log.add(replace(outcome, input="/in/b"))
+        assert log.path.stat().st_size == size
+        log.add(replace(outcome, input="/in/c"))
+    assert list(read_log(tmp_path / "batch.jsonl")) == ["/in/a", "/in/c"]
+
+
+def test_a_folder_for_temporary_files_that_is_full(batch, small_disk, monkeypatch):
+    disk = small_disk(64)
+    (disk / "filler").write_bytes(bytes(2**16 - 4096))
+    monkeypatch.setattr("tempfile.tempdir", str(disk))
+    with pytest.raises(BatchError, match="make room on the disk"):
+        batch({"a": "one"}).run(QUIET)
+
+
+def test_a_folder_that_is_deleted_while_the_batch_runs(batch, tmp_path):
+    def delete(stage, share):
+        if share > 0:  # at once: a child writes to it meanwhile
+            (tmp_path / "out").rename(tmp_path / "gone")
+
+    with pytest.raises(BatchError, match="out: the folder was deleted while the batch was running"):
+        batch({"a": "one", "b": "two", "c": "three"}, processes=1).run(Progress(delete))
+
+
+def test_folders_that_cannot_be_used(batch, tmp_path):
+    (tmp_path / "link").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(BatchError, match="link: this is a link to a folder that does not exist"):
+        batch({"a": "one"}, folder=tmp_path / "link").run(QUIET)
+    if Path("/proc/self").is_dir():
+        with pytest.raises(BatchError, match=r"/proc/self/out: .*take another --output"):
+            batch({"a": "one"}, folder=Path("/proc/self/out")).run(QUIET)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="logs are not locked on Windows")
 def test_two_batches_do_not_write_to_one_log(batch):
     first = threading.Thread(target=batch({"slow": "sleep 3"}).run, args=(QUIET,))
@@ -184,7 +256,11 @@ def test_a_part_without_files_is_refused(batch):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has other signals")
-def test_ctrl_c_ends_the_children_and_says_how_to_continue(batch, tmp_path):
+@pytest.mark.parametrize("before", [signal.default_int_handler, signal.SIG_IGN], ids=["usual", "ignored"])
+def test_ctrl_c_ends_the_children_and_says_how_to_continue(batch, tmp_path, before, request):
+    """Also where the shell ignores it, as after `&` in a script."""
+    outside = signal.signal(signal.SIGINT, before)
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, outside or signal.SIG_DFL))
     pids = []
 
     def interrupt(stage, share):
@@ -192,8 +268,9 @@ def test_ctrl_c_ends_the_children_and_says_how_to_continue(batch, tmp_path):
             pids.append(int((tmp_path / "out" / "a.txt").read_text().split()[1]))
             os.kill(os.getpid(), signal.SIGINT)
 
-    with pytest.raises(BatchError, match=r"ended by the user with 1 of 3 files done.*--resume"):
+    with pytest.raises(BatchError, match=r"ended by the user with 1 of 3 files done.*--resume"), interruptible():
         batch({"a": "one", "b": "sleep 50", "c": "sleep 50"}).run(Progress(interrupt))
+    assert signal.getsignal(signal.SIGINT) is before
     with pytest.raises(ProcessLookupError):
         os.kill(pids[0], 0)
     assert len(lines(tmp_path / "out")) == 1

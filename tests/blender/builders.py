@@ -275,9 +275,14 @@ def scene_snapshot():
         "active": context.view_layer.objects.active and context.view_layer.objects.active.name,
         "frame": (context.scene.frame_current, context.scene.frame_subframe),
         "model": (context.scene.wks_segment.model, context.scene.wks_segment.model_summary),
-        "notes": context.scene.wks_segment.part_notes,
+        "notes": {row.name: notes for row in context.scene.wks_segment.label_sets if (notes := said(row))},
         "segments": listed(context.scene.wks_segment),
     }
+
+
+def said(row):
+    """What a user said about the parts of a label set."""
+    return {name: value for name, value in json.loads(row.notes).items() if name != "palette"}
 
 
 def listed(settings):

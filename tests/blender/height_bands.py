@@ -7,7 +7,9 @@ from builders import (
     numbers,
 )
 
+from wks_segment.blender.outputs.origin import Origin, origin_of
 from wks_segment.blender.parts import part_ids
+from wks_segment.blender.props.label_set import style_of
 from wks_segment.blender.scene.characters import Character
 from wks_segment.blender.workflow import pipeline
 from wks_segment.blender.workflow.report import Report
@@ -30,10 +32,15 @@ def write(settings, *objects):
     return report
 
 
-def write_labels(settings, labels, report=None, renumbered=False):
-    """Write parts of polygons, as a model would give them."""
-    request = pipeline.LabelRequest.of(settings, labels)
-    pipeline.write_outputs(settings, labels, request, report or Report([]), renumbered=renumbered)
+def write_labels(settings, labels, report=None, of="bands/3"):
+    """Write parts of polygons, as a model would give them, of a label set."""
+    request, origin = pipeline.LabelRequest.of(settings, labels), Origin(of)
+    pipeline.write_outputs(settings, labels, request, report or Report([]), origin=origin)
+
+
+def style_on(obj):
+    """Names and colors of the parts on an object."""
+    return style_of(origin_of(obj.data).labels)
 
 
 def activate(settings, part):
@@ -69,7 +76,7 @@ def corners_of(obj, part):
 
 def all_agrees(obj, settings):
     """Colors, materials, groups and the vertices' attribute say what the faces' labels and the list say."""
-    style, found = settings.style(), part_ids.unique_parts(labels_of(obj))
+    style, found = style_on(obj), part_ids.unique_parts(labels_of(obj))
     for part in found:
         expected = np.rint(255 * style.colors_of(np.array(part)))
         np.testing.assert_allclose(colors_at(obj, part), [expected], atol=1)

@@ -1,6 +1,7 @@
-"""Labels that follow the settings, without waiting for the timer."""
+"""Labels that follow the settings, and fields that follow the active object, without waiting for timers."""
 
 import bpy
+from builders import select
 
 
 def rest(session):
@@ -9,3 +10,9 @@ def rest(session):
     if bpy.app.timers.is_registered(session.timer):
         bpy.app.timers.unregister(session.timer)
     return session.on_timer()
+
+
+def click(*objects):
+    """Select objects, the first of which is active, as with the mouse: fields and list follow."""
+    select(*objects)
+    bpy.types.WindowManager.wks_segment_active_object.on_timer()

@@ -59,6 +59,19 @@ def faults_of(tmp_path, *args, **kwargs):
     return build_zip.zip_faults(write_zip(tmp_path / "made_up.zip", *args, **kwargs), "linux-x64", PYTHONS)
 
 
+def test_the_readme_of_the_zip_has_no_link_that_leads_nowhere(tmp_path):
+    target = tmp_path / "extension"
+    target.mkdir()
+    build_zip.stage(ROOT, target, "linux-x64", [])
+    whole, text = (ROOT / "README.md").read_text(encoding="utf-8"), (target / "README.md").read_text(encoding="utf-8")
+    links = re.findall(r"\]\(([^)\s]+)\)", text)
+    assert "LICENSE" in links
+    assert [link for link in links if not link.startswith("http") and not (target / link).exists()] == []
+    assert "![" not in text
+    assert text.split()[:40] == whole.split("![")[0].split()[:40]
+    assert "The five-minute tutorial goes through it slowly." in text.replace("\n", " ")
+
+
 def test_complete_zip_has_no_fault(tmp_path):
     assert faults_of(tmp_path, LINUX_WHEELS) == []
 

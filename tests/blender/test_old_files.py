@@ -108,3 +108,19 @@ def test_old_model_gives_the_same_labels_but_for_a_few_faces_at_borders(old_scen
         # Long edges are halved in another order than in 0.1.0, which moves borders by a face here and there.
         assert np.mean(found == labels) > 0.92, name
     assert settings.model
+
+
+def test_old_labels_belong_to_the_model_that_was_in_use(old_scene):
+    settings = old_scene.wks_segment
+    settings.write_materials = settings.write_face_sets = settings.write_seams = True
+    select(bpy.data.objects["Pose 0"])
+    bpy.ops.wks_segment.refresh_segments()
+    assert settings.segments[0].labels == settings.labels() != ""
+    settings.segments[0].name = "Trunk"
+    assert "WKS Trunk" in bpy.data.objects["Pose 1"].vertex_groups, "of the same model"
+    settings.n_segments = 3
+    assert bpy.ops.wks_segment.update() == {"FINISHED"}
+    assert settings.faces_by_hand == 12
+    settings.n_segments = 4
+    bpy.ops.wks_segment.update()
+    assert [item.name for item in settings.segments] == ["Trunk", "Segment 2", "Segment 3", "Segment 4"]

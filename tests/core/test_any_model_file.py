@@ -7,7 +7,7 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapes import creature
 from tally import count
@@ -62,6 +62,7 @@ def replaced(content, path, change):
 def edited(draw, text):
     """The text with some values removed or replaced by unexpected ones."""
     content = json.loads(text)
+    content.pop("digest")  # which would be wrong
     for _ in range(draw(st.integers(1, 3))):
         path = draw(st.sampled_from(list(places(content))[1:]))
         if draw(st.booleans()):
@@ -94,6 +95,95 @@ def foreign(draw, text):
 
 
 DAMAGES = {damage.__name__: damage for damage in (edited, truncated, overwritten, nested, foreign)}
+
+
+@pytest.fixture(scope="module")
+def small():
+    """A body of 42 vertices, which is refined all the same."""
+    return creature(0.3, 1)
+
+
+def negative(value):
+    return [negative(each) for each in value] if isinstance(value, list) else -value
+
+
+def first_number(value, new):
+    """The same nested lists with another first number."""
+    return [first_number(value[0], new), *value[1:]] if isinstance(value, list) else new
+
+
+def changes_of(value):
+    """A value of a model file with another type, sign, size, shape or length, by name."""
+    yield from {"none": None, "true": True, "text": "4", "object": {}, "huge text": "x\x1b[31m" * 5000}.items()
+    if isinstance(value, str):
+        return
+    yield from {"empty": [], "nested": [value], "negative": negative(value)}.items()
+    for number in (0, 1, -1, 0.5, 5000, 1e5, 10**30, float("nan")):
+        yield f"number {number}", number
+        if isinstance(value, list) and value:
+            yield f"first {number}", first_number(value, number)
+    if isinstance(value, list) and value:
+        yield from {"shorter": value[:-1], "longer": [*value, value[-1]], "very long": value * 3000}.items()
+        yield "truth values", first_number(value, True)
+        yield "transposed", np.array(value).T.tolist()
+
+
+SECONDS, BYTES = 5.0, 500e6
+"""What a model of a stranger may take to label a small body, unless the estimate said more."""
+
+
+def ended(content, mesh):
+    """How it ends to label a body with a model of this content: in time, and without much memory."""
+    tracemalloc.start()
+    start = time.process_time()
+    try:
+        model = PoseSegmentation.from_json(json.dumps(content))
+        seconds, needed = model.estimate([mesh])
+        if seconds > SECONDS or needed > BYTES:
+            return "above limits"
+        labels = model.segment_faces(mesh)
+        assert 0 <= labels.min() <= labels.max() < model.n_segments_
+        return "labeled"
+    except ModelFileError as error:
+        text = str(error)
+        assert text.isprintable(), text
+        assert 20 < len(text) < 400, text
+        return "refused"
+    finally:
+        taken, peak = time.process_time() - start, tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert peak < BYTES
+        assert taken < 2 * SECONDS  # which takes longer while memory is traced
+
+
+@pytest.mark.parametrize("kind", [KINDS[0], "bodies"])
+def test_every_field_of_a_model_changed_in_every_way(texts, small, kind):
+    original = json.loads(texts[kind])
+    original.pop("digest")
+    assert ended(original, small) == "labeled"
+    parameters = original.pop("parameters")
+    changed = [
+        *((change, {"parameters": parameters | {name: value}}) for name in parameters for change, value in
+          changes_of(parameters[name])),
+        *((change, {"parameters": parameters, name: value}) for name in original for change, value in
+          changes_of(original[name])),
+    ]  # fmt: skip
+    few = settings().max_examples < 100  # all of them by `make fuzz`
+    for change, fields in changed[:: 11 if few else 1]:
+        count("changed field", [change], ended(original | fields, small))
+
+
+@pytest.mark.parametrize("opening", ["[", "{", "[[", "0"])
+def test_nineteen_megabytes_of_small_values_take_little_memory(tmp_path, opening):
+    closing = opening.translate(str.maketrans("[{0", "]} "))
+    path, text = tmp_path / "model.json", f"{opening}{closing},"
+    path.write_text("[" + text * (19_000_000 // len(text)) + "0]")
+    tracemalloc.start()
+    with pytest.raises(ModelFileError, match="too many values"):
+        PoseSegmentation.load(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 200e6
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -81,7 +81,7 @@ def check_refused(text, change, message):
         (lambda c: c["weights"].__setitem__(0, 0.9), "weights do not sum to 1"),
         (lambda c: c.update(weights=3), "weights is missing"),
         (lambda c: c.update(weights=[1e-6] * 10_000), "has too many numbers"),
-        (lambda c: c["parameters"].update(n_segments=[3]), r"\[3\] segments of K components"),
+        (lambda c: c["parameters"].update(n_segments=[3]), r"n_segments cannot be \[3\]"),
         (lambda c: c["parameters"].update(n_segments=len(c["weights"]) + 1), "M segments of K components"),
         (lambda c: c["joins"].pop(), r"joins has the shape \(\d+, 2\), not \(L, 2\)"),
         (lambda c: c["joins"].__setitem__(1, c["joins"][0]), "which cannot be joined"),
@@ -99,6 +99,70 @@ def check_refused(text, change, message):
 )
 def test_a_damaged_model_is_refused_with_the_reason(text, change, message):
     check_refused(text, change, message)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda c: c["parameters"].update(n_eigenpairs=True), "n_eigenpairs cannot be True"),
+        (lambda c: c["parameters"].update(smoothness=False), "smoothness cannot be False"),
+        (lambda c: c.update(n_kinds=True), "n_kinds is missing or not numbers"),
+        (lambda c: c["weights"].__setitem__(0, str(c["weights"][0])), "weights is missing or not numbers"),
+        (lambda c: c["means"][0].__setitem__(0, 1e5 * c["means"][0][0]), "means has a number that is far too large"),
+        (lambda c: c["certainties"].__setitem__(0, -0.5), "certainties has a negative number"),
+        (lambda c: c["region_distance"][0].__setitem__(0, -1e-3), "region_distance has a negative number"),
+        (lambda c: c["region_area"].__setitem__(0, 2.0), "region_area has a number of 2, too large"),
+        (lambda c: c.update(version="5\x1b[31m" + "x" * 1000), r"version '5\\x1b\[31mx{5,50}…?"),
+        (lambda c: c["parameters"].update(accuracy="\n" * 300), r"accuracy cannot be '(\\n)+"),
+    ],
+)
+def test_what_no_fit_makes_is_refused_also_without_a_digest(text, change, message):
+    def without_digest(content):
+        content.pop("digest")
+        change(content)
+
+    check_refused(text, without_digest, message)
+    damaged, _ = changed(text, without_digest)
+    with pytest.raises(ModelFileError) as caught:
+        PoseSegmentation.from_json(damaged)
+    assert str(caught.value).isprintable()
+    assert len(str(caught.value)) < 200
+
+
+@pytest.mark.parametrize("name", ["means", "covariances", "region_signature", "likeness", "usual_scores", "centre"])
+def test_arrays_of_another_model_are_refused(text, name):
+    other = json.loads(PoseSegmentation(3, n_eigenpairs=30, n_energies=20).fit([creature(0.3, 3)]).to_json())
+    content = json.loads(text)
+    if np.shape(content[name]) != np.shape(other[name]):
+        other[name] = np.array(content[name])[::-1].tolist()
+    with pytest.raises(ModelFileError, match="numbers are not those that were saved"):
+        PoseSegmentation.from_json(json.dumps(content | {name: other[name]}))
+
+
+def test_what_people_edit_by_hand_needs_no_new_digest(text):
+    content = json.loads(text)
+    content["parameters"] |= {"smoothness": 0.5, "n_segments": 2}
+    content["part_names"] = {"0": "Head"}
+    model = PoseSegmentation.from_json(json.dumps(content, indent=2))
+    assert (model.smoothness, model.part_notes_.names) == (0.5, {0: "Head"})
+    assert json.loads(model.to_json())["digest"] == content["digest"]
+    content["parameters"]["n_eigenpairs"] = 300
+    with pytest.raises(ModelFileError, match="numbers are not those that were saved"):
+        PoseSegmentation.from_json(json.dumps(content))
+
+
+def test_a_model_without_a_digest_is_read(text):
+    content = json.loads(text)
+    content.pop("digest")
+    assert PoseSegmentation.from_json(json.dumps(content)).to_json() == text
+
+
+def test_the_estimate_of_a_model_with_thousands_of_eigenpairs_is_large(text):
+    """It passed the limit of five minutes, and took much longer."""
+    content = json.loads(text)
+    content.pop("digest")
+    content["parameters"]["n_eigenpairs"] = 5000
+    assert PoseSegmentation.from_json(json.dumps(content)).estimate([creature(0.0, 2)])[0] > 1000
 
 
 @pytest.mark.parametrize(

@@ -6,17 +6,18 @@ import shutil
 import sys
 import time
 from collections.abc import Generator, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from ..core.files.whole_file import is_disk_full
 from ..core.progress import Progress
 from . import local_pool
 from .child_process import Program
-from .errors import BatchError
-from .html_report import write_report
+from .errors import BatchError, disk_full_error
+from .html_report import REPORT_NAME, write_report
 from .job import Job, Outcome
 from .limits import Limits
 from .results_log import ResultsLog, find_logs, log_name, read_log, read_logs, write_log
@@ -72,12 +73,24 @@ class Batch:
         Raises
         ------
         BatchError
-            If the folder contains anything else, if a file that would be written exists already, if another batch is
-            running in the folder, if no child process can be started, or if the user ends the batch.
+            If the folder contains anything else or cannot be written to, if a file that would be written exists
+            already, if another batch is running in the folder, if no child process can be started, if the disk is
+            full, or if the user ends the batch.
         """
+        try:
+            return self._run(progress)
+        except OSError as error:
+            raise self._not_written(error) from error
+
+    def _run(self, progress: Progress) -> dict[str, Any]:
         self._check_folder()
         self._check_requirements()
-        self.folder.mkdir(parents=True, exist_ok=True)
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise BatchError(
+                f"{self.folder}: the folder cannot be made: {error.strerror}: take another --output"
+            ) from error
         jobs = self.jobs if self.part is None else self.jobs[self.part[0] - 1 :: self.part[1]]
         name = log_name(self.part)
         # A folder for each log, since parts of a batch run at the same time.
@@ -91,16 +104,33 @@ class Batch:
             unfinished.mkdir(parents=True)
             try:
                 self._run_jobs(waiting, log, len(jobs), unfinished, progress)
-            finally:
-                shutil.rmtree(unfinished, ignore_errors=True)
-                if not any((self.folder / UNFINISHED_FOLDER).iterdir()):
-                    (self.folder / UNFINISHED_FOLDER).rmdir()
-                finished = [log.outcomes[job.input] for job in jobs if job.input in log.outcomes]
-                if finished:
-                    report = write_report(self.folder, self._with_other_parts(finished), len(self.jobs))
-                else:  # no job was finished: leave no log, so that the same command may start the batch again
-                    log.path.unlink()
+            except BaseException:
+                with suppress(OSError):  # the first error is the reason
+                    self._finish(jobs, log, unfinished)
+                raise
+            finished, report = self._finish(jobs, log, unfinished)
         return _summary(finished, len(jobs), len(waiting), log.path, report)
+
+    def _finish(self, jobs: Sequence[Job], log: ResultsLog, unfinished: Path) -> tuple[list[Outcome], Path]:
+        """Remove the temporary folder and write the report; outcomes of the jobs, and path of the report."""
+        shutil.rmtree(unfinished, ignore_errors=True)
+        with suppress(OSError):  # other parts of the batch have theirs in it
+            (self.folder / UNFINISHED_FOLDER).rmdir()
+        finished = [log.outcomes[job.input] for job in jobs if job.input in log.outcomes]
+        if finished:
+            write_report(self.folder, self._with_other_parts(finished), len(self.jobs))
+        else:  # leave no log, so that the same command may start the batch again
+            log.path.unlink()
+        return finished, self.folder / REPORT_NAME
+
+    def _not_written(self, error: OSError) -> BatchError:
+        """The error of a batch that could not write to its folder."""
+        reason = f"{error.filename or self.folder}: {error.strerror or error}"
+        if is_disk_full(error):
+            return disk_full_error(reason)
+        if not self.folder.is_dir() and isinstance(error, FileNotFoundError):
+            return BatchError(f"{self.folder}: the folder was deleted while the batch was running")
+        return BatchError(f"{reason}: take another --output, or make this folder writable")
 
     def _run_jobs(
         self, jobs: Sequence[Job], log: ResultsLog, n_files: int, unfinished: Path, progress: Progress
@@ -161,6 +191,8 @@ class Batch:
         return all((self.folder / path).is_file() for path in outcome.outputs.values())
 
     def _check_folder(self) -> None:
+        if self.folder.is_symlink() and not self.folder.exists():
+            raise BatchError(f"{self.folder}: this is a link to a folder that does not exist: make that folder first")
         if self.folder.exists() and not self.folder.is_dir():
             raise BatchError(f"{self.folder}: this is a file; give the name of a folder")
         used = self.folder.is_dir() and any(self.folder.iterdir())

@@ -25,10 +25,11 @@ SELF_END_FACTOR = 1.5
 
 
 class Answer(NamedTuple):
-    """Result of a call, or the reason why there is none."""
+    """Result of a call, or the reason why there is none, and whether it is that the disk is full."""
 
     result: dict[str, Any] | None
     error: str = ""
+    disk_full: bool = False
 
 
 def serve(folder: Path, run: Callable[[list[str]], Answer]) -> int:

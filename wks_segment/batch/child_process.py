@@ -21,14 +21,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..core.files.whole_file import has_no_space
 from .child_main import READY_FILE, Answer
-from .errors import BatchEndedError, BatchError
+from .errors import BatchEndedError, BatchError, disk_full_error
 from .limits import resident_memory
 
 CHILD_COMMAND = "batch-child"
 """Command of the command line that runs `child_main.serve`."""
-POLL_SECONDS = 0.05
-"""Time between two checks of a child."""
+POLL_SECONDS, POLL_SHARE = (0.002, 0.05), 0.05
+"""Shortest and longest time between two checks of a child, and their share of the time that a call has taken so far."""
 START_SECONDS = 180.0
 """Time limit for the start of a child; Blender on a slow network drive takes long."""
 EXIT_SECONDS = 5.0
@@ -46,6 +47,8 @@ ONE_THREAD = {
     "LP_NUM_THREADS": "1",  # Mesa, which renders pictures without a graphics card
 }
 """Environment of children: each core has a child of its own, and libraries read these variables when they load."""
+TEMPORARY = ("TMPDIR", "TMP", "TEMP")
+"""Variables that name the folder for temporary files."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +118,7 @@ class ChildProcess:
         BatchEndedError
             If the batch was ended meanwhile.
         BatchError
-            If no child can be started at all.
+            If no child can be started at all, or its folder is full.
         """
         if self._n_calls >= MAX_CALLS:
             self.close()
@@ -129,7 +132,7 @@ class ChildProcess:
         except OSError:
             process.wait()  # it crashed while it was idle: `_wait_for` reports that
         answer = self._wait_for(self._folder / str(self._n_calls), process, seconds)
-        return Answer(answer["result"], answer["error"])
+        return Answer(**answer)
 
     def close(self) -> None:
         """Let an idle process end by itself; kill it if it does not."""
@@ -156,7 +159,9 @@ class ChildProcess:
             with open(self._folder / "printed", "wb") as printed:
                 process = subprocess.Popen(
                     command, stdin=subprocess.PIPE, stdout=printed, stderr=printed,
-                    env={**os.environ, **ONE_THREAD, **dict(self.program.environment)},
+                    # Temporary files go with the folder, however the process ends.
+                    env=os.environ | ONE_THREAD | dict.fromkeys(TEMPORARY, str(self._folder))
+                    | dict(self.program.environment),
                     # Ctrl+C reaches only the parent, which ends its children.
                     start_new_session=True, creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
                 )  # fmt: skip
@@ -172,7 +177,7 @@ class ChildProcess:
 
     def _wait_for(self, answer: Path, process: subprocess.Popen[bytes], seconds: float) -> dict[str, Any]:
         """Content of a file that the child writes; ChildError or BatchEndedError if it is not written."""
-        deadline = time.monotonic() + seconds
+        begun = time.monotonic()
         used_before = self._n_calls > 1
         while True:
             has_ended = process.poll() is not None  # before the look for the answer, which it may have written last
@@ -181,13 +186,16 @@ class ChildProcess:
                 answer.unlink()
                 return content
             if has_ended:
+                if has_no_space(self._folder):
+                    raise disk_full_error(f"{self._folder}: the folder for temporary files is full")
                 reason = f"its process {_describe_exit(process.returncode)}{self._printed()}"
                 self._forget()
                 raise ChildError(reason, may_retry=used_before)
             if self.is_ended():
                 self.kill()
                 raise BatchEndedError
-            if time.monotonic() > deadline:
+            passed = time.monotonic() - begun
+            if passed > seconds:
                 self.kill()
                 raise ChildError(f"it took more than {seconds:g} seconds and was ended; see --time-limit")
             if resident_memory(process.pid) > self.memory:
@@ -195,7 +203,7 @@ class ChildProcess:
                 reason = f"it took more than {self.memory / 1e9:.1f} GB of memory and was ended; see --memory-limit"
                 raise ChildError(reason, may_retry=used_before)
             try:
-                process.wait(POLL_SECONDS)
+                process.wait(min(max(POLL_SHARE * passed, POLL_SECONDS[0]), POLL_SECONDS[1]))
             except subprocess.TimeoutExpired:
                 continue
 

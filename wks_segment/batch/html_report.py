@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from html import escape
 from pathlib import Path
 from urllib.parse import quote
 
+from ..core.files.whole_file import write_whole
 from .job import Outcome
 
 REPORT_NAME = "report.html"
@@ -56,9 +58,7 @@ def write_report(folder: Path, outcomes: Iterable[Outcome], n_files: int, title:
         "</main></body></html>",
     ])  # fmt: skip
     path = folder / REPORT_NAME
-    unfinished = path.with_suffix(".part")
-    unfinished.write_text(text, encoding="utf-8")
-    unfinished.replace(path)
+    write_whole(path, text.encode(errors="backslashreplace"))  # names of files that are not UTF-8
     return path
 
 
@@ -78,8 +78,12 @@ def _figure(outcome: Outcome) -> str:
     """Thumbnail of a file with its name, links, facts and warnings."""
     files = list(outcome.outputs.values())
     picture = next((file for file in files if file.endswith(THUMBNAIL_SUFFIX)), None)
-    image = "" if picture is None else f'<img loading="lazy" src="{quote(picture)}" alt="{escape(outcome.name)}">'
-    links = [f'<a href="{quote(file)}">{escape(file)}</a>' for file in files if file != picture]
+    image = (
+        ""
+        if picture is None
+        else f'<img loading="lazy" src="{quote(os.fsencode(picture))}" alt="{escape(outcome.name)}">'
+    )
+    links = [f'<a href="{quote(os.fsencode(file))}">{escape(file)}</a>' for file in files if file != picture]
     facts = [f"{outcome.result['segments']} segments"] if "segments" in outcome.result else []
     facts += [f"{len(poses)} pose{'s' * (len(poses) != 1)}"] if (poses := outcome.result.get("poses")) else []
     facts += [f"best model: {outcome.result['best']}"] if outcome.result.get("best") else []

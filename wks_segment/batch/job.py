@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -84,7 +85,10 @@ class Outcome:
 
     def to_line(self) -> str:
         """The outcome as one line of JSON."""
-        return json.dumps(_finite(asdict(self)), ensure_ascii=False, allow_nan=False)
+        values = _finite(asdict(self))
+        line = json.dumps(values, ensure_ascii=False, allow_nan=False)
+        # A file name that is not UTF-8 has letters that only JSON of ASCII can hold.
+        return line if _is_utf8(line) else json.dumps(values, allow_nan=False)
 
     @classmethod
     def from_line(cls, line: str) -> Outcome | None:
@@ -110,8 +114,16 @@ def hash_models(path: Path) -> str:
     digest = hashlib.blake2b(digest_size=12)
     for file in sorted(path.glob("*.json")) if path.is_dir() else [path]:
         if file.is_file():
-            digest.update(file.name.encode() + b"\0" + file.read_bytes())
+            digest.update(os.fsencode(file.name) + b"\0" + file.read_bytes())
     return digest.hexdigest()
+
+
+def _is_utf8(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _finite(value: Any) -> Any:

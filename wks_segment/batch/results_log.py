@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import TextIO
+from typing import BinaryIO
 
+from ..core.files.whole_file import write_whole
 from .errors import BatchError
 from .job import Outcome
 
@@ -45,9 +47,7 @@ def read_logs(paths: Iterable[Path]) -> dict[str, Outcome]:
 
 def write_log(path: Path, outcomes: Iterable[Outcome]) -> None:
     """Write a log anew; the file appears complete."""
-    unfinished = path.with_suffix(".part")
-    unfinished.write_text("".join(f"{outcome.to_line()}\n" for outcome in outcomes), encoding="utf-8")
-    unfinished.replace(path)
+    write_whole(path, "".join(f"{outcome.to_line()}\n" for outcome in outcomes))
 
 
 class ResultsLog:
@@ -73,20 +73,23 @@ class ResultsLog:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.outcomes: dict[str, Outcome] = {}
-        self._file: TextIO | None = None
+        self._file: BinaryIO | None = None
         self._n_lines = 0
 
     def __enter__(self) -> ResultsLog:
-        self._file = open(self.path, "a+", encoding="utf-8", errors="replace")  # closed by __exit__
-        if not _lock(self._file):
+        self._file = open(self.path, "a+b", buffering=0)  # closed by __exit__
+        try:
+            if not _lock(self._file):
+                raise BatchError(f"{self.path}: another batch writes to it: wait for its end, or take another --output")
+            self.outcomes = read_log(self.path)
+            self._file.seek(0)
+            data = self._file.read()
+            self._n_lines = data.count(b"\n")
+            if data and not data.endswith(b"\n"):
+                self._append(b"\n")  # an incomplete line must not become the beginning of the next one
+        except BaseException:
             self._file.close()
-            raise BatchError(f"{self.path}: another batch writes to it: wait for its end, or take another --output")
-        self.outcomes = read_log(self.path)
-        self._file.seek(0)
-        text = self._file.read()
-        self._n_lines = len(text.splitlines())
-        if text and not text.endswith("\n"):
-            self._file.write("\n")  # an incomplete line must not become the beginning of the next one
+            raise
         return self
 
     def __exit__(
@@ -94,20 +97,31 @@ class ResultsLog:
     ) -> None:
         assert self._file is not None
         if self._n_lines > len(self.outcomes):
-            write_log(self.path, self.outcomes.values())  # one line for each file, which is easier to read
+            with suppress(OSError):  # the longer log says the same
+                write_log(self.path, self.outcomes.values())  # one line for each file, which is easier to read
         self._file.close()
 
     def add(self, outcome: Outcome) -> None:
-        """Append the outcome of a job; it replaces earlier ones of the same input."""
-        assert self._file is not None
-        self._file.write(f"{outcome.to_line()}\n")
-        self._file.flush()
-        os.fsync(self._file.fileno())
+        """Append the outcome of a job, which replaces earlier ones of the same input; OSError if that fails."""
+        self._append(f"{outcome.to_line()}\n".encode())
         self._n_lines += 1
         self.outcomes[outcome.input] = outcome
 
+    def _append(self, line: bytes) -> None:
+        """Add a line to the file, all of it or nothing."""
+        assert self._file is not None
+        size = self._file.seek(0, os.SEEK_END)
+        try:
+            while line:  # a disk that is nearly full takes a piece of it first
+                line = line[self._file.write(line) :]
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            self._file.truncate(size)
+            error.filename = error.filename or str(self.path)
+            raise
 
-def _lock(file: TextIO) -> bool:
+
+def _lock(file: BinaryIO) -> bool:
     """Lock a file until it is closed; False if another process holds the lock. Windows has no such lock."""
     try:
         import fcntl

@@ -8,8 +8,10 @@ import tempfile
 import time
 from pathlib import Path
 
+from ..core.files.whole_file import has_no_space
 from .child_main import Answer
 from .child_process import ChildError, ChildProcess
+from .errors import disk_full_error
 from .job import Job, Outcome
 
 LOGGED_FIELDS = ("segments", "parts", "poses", "certainty", "rankings", "best", "verdict", "warnings", "notes")
@@ -32,6 +34,8 @@ def run_job(job: Job, child: ChildProcess, seconds: float, unfinished: Path) -> 
     ------
     BatchEndedError, BatchError
         As `ChildProcess.call` does.
+    DiskFullError
+        If the job failed because the disk is full, as all others would.
     """
     begun = time.monotonic()
     # A new folder for each run: a machine that is believed dead may still write to its own.
@@ -41,7 +45,9 @@ def run_job(job: Job, child: ChildProcess, seconds: float, unfinished: Path) -> 
     try:
         for path in job.outputs.values():
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        result, reason = _call(job, child, seconds, folder)
+        result, reason, disk_full = _call(job, child, seconds, folder)
+        if result is None and (disk_full or has_no_space(folder)):
+            raise disk_full_error(reason.replace(f"{folder}/", ""))
         missing = [path for path in job.outputs.values() if not (folder / path).is_file()]
         if result is not None and missing:
             result, reason = None, f"it was not written: {', '.join(missing)}"

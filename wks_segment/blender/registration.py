@@ -36,6 +36,7 @@ from .operators.transfer import WKS_SEGMENT_OT_transfer
 from .operators.unwrap import WKS_SEGMENT_OT_unwrap
 from .operators.update import WKS_SEGMENT_OT_update
 from .props import changes, preferences, presets
+from .props.label_set import WKSLabelSet
 from .props.model_item import WKSModelItem, WKSRankItem
 from .props.segment_item import WKSSegmentItem
 from .props.settings import WKSSegmentSettings
@@ -43,6 +44,7 @@ from .ui import main_panel, menu, models_panel, segments_panel
 from .ui.preview import ViewportPreview
 from .ui.translations import TRANSLATIONS
 from .ui.viewport_colors import VIEWPORT_COLORS, ViewportColors
+from .workflow.active_object import ACTIVE_OBJECT, ActiveObject
 from .workflow.background_job import JOB_HOLDER, JobHolder
 from .workflow.live_session import SESSION, Session
 from .workflow.property_changes import PropertyChanges
@@ -84,6 +86,7 @@ CLASSES = (
     preferences.WKSSegmentPreferences,
     WKSSegmentItem,
     WKSModelItem,
+    WKSLabelSet,
     WKSRankItem,
     WKSSegmentSettings,
     *OPERATORS,
@@ -109,7 +112,9 @@ def register() -> None:
         bpy.utils.register_class(cls)
     bpy.types.Scene.wks_segment = bpy.props.PointerProperty(type=WKSSegmentSettings)
     setattr(bpy.types.WindowManager, JOB_HOLDER, JobHolder())
-    setattr(bpy.types.WindowManager, SESSION, Session(ViewportPreview()))
+    session = Session(ViewportPreview())
+    setattr(bpy.types.WindowManager, SESSION, session)
+    setattr(bpy.types.WindowManager, ACTIVE_OBJECT, ActiveObject(lambda: session.follow(bpy.context.scene)))
     setattr(bpy.types.WindowManager, VIEWPORT_COLORS, ViewportColors())
     bpy.app.translations.register(__name__, TRANSLATIONS)
     bpy.types.VIEW3D_MT_object.append(menu.draw_in_object_menu)
@@ -121,7 +126,7 @@ def unregister() -> None:
     bpy.utils.unregister_cli_command(_commands.pop())
     bpy.types.VIEW3D_MT_object.remove(menu.draw_in_object_menu)
     bpy.app.translations.unregister(__name__)
-    for name in (VIEWPORT_COLORS, SESSION, JOB_HOLDER):
+    for name in (VIEWPORT_COLORS, ACTIVE_OBJECT, SESSION, JOB_HOLDER):
         getattr(bpy.types.WindowManager, name).close()
         delattr(bpy.types.WindowManager, name)
     del bpy.types.Scene.wks_segment

@@ -3,15 +3,27 @@
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import Any, get_args
 
 import numpy as np
 
+from .files.checked_json import (
+    BELOW_ONE,
+    MOST_NUMBER,
+    POSITIVE,
+    DamagedError,
+    Field,
+    digest_of,
+    length,
+    parsed,
+    quoted,
+    read_array,
+)
+from .files.whole_file import write_whole
 from .labeling.region_atlas import RegionAtlas
 from .labeling.traits import FIELDS, PLANES
 from .learning.gaussian_mixture import CovarianceType, GaussianMixture
@@ -36,8 +48,14 @@ LEAST_CUT = 1e-6
 """Lower bound of borders in such a model, whose logarithm must be finite."""
 MOST_OF_PARAMETER = {"n_segments": 1000, "n_eigenpairs": 5000, "n_energies": 1000}
 """Upper bounds of parameters in a file: with more, a mesh would be refined until the memory is full."""
-MOST_NUMBER = 1e6
-"""Upper bound of numbers in a file, whose squares bound variances: beyond, single precision would overflow."""
+MOST_SEED = 2**32
+"""Upper bound of other parameters, of which the seed is the largest."""
+FARTHEST_MEAN = 2.0
+"""How far a mean may be, in units of the largest distance that is possible; fits reach 0.6 of it."""
+ADJUSTABLE = ("n_segments", "smoothness")
+"""Parameters that are changed after a model was learned."""
+WHOLE_SHARE = 1.001
+"""Upper bound of certainties and shares of the area, which are rounded."""
 MOST_COMPONENTS, MOST_REGIONS, MOST_POSES = 2700, 400, 10_000
 """Upper bounds of counts in a file: above what any fit makes, and small enough to be checked in a second."""
 REGION_KINDS = ("region", "sided")
@@ -45,7 +63,6 @@ REGION_KINDS = ("region", "sided")
 MAX_BYTES = 20 * 2**20
 """Maximum size of a file, which would take more than a second to read: 64 segments with diagonal covariances take
 300 kB, 8 with full ones 2 MB."""
-_POSITIVE, _BELOW_ONE = float(np.nextafter(0.0, 1.0)), float(np.nextafter(1.0, 0.0))
 
 
 class ModelFileError(ValueError):
@@ -101,6 +118,7 @@ def encode(model: ModelContent) -> str:
         "version": MODEL_VERSION,
         "parameters": {name: model.parameters[name] for name in PARAMETERS},
         "mixture_covariance_type": mixture.covariance_type,
+        "digest": _digest(model.parameters, mixture.covariance_type, arrays),
         **model.part_notes.as_json(),
         **{name: array.tolist() for name, array in arrays.items()},
     }
@@ -110,12 +128,22 @@ def encode(model: ModelContent) -> str:
 def decode(text: str) -> ModelContent:
     """The model in JSON text, with every value checked; ModelFileError if anything is wrong."""
     content = _content(text)
+    try:
+        return _decoded(content)
+    except DamagedError as error:
+        raise ModelFileError(Message("the model is damaged: {reason}", reason=message_of(error))) from error
+
+
+def _decoded(content: dict[str, Any]) -> ModelContent:
+    """The model in the JSON object of a file; DamagedError, which names the value, if one is wrong."""
     parameters = _parameters(content)
     covariance_type: CovarianceType = content.get("mixture_covariance_type")  # type: ignore[assignment]  # checked next
     if covariance_type not in get_args(CovarianceType):
-        raise _damaged(Message("unknown covariance type {value!r}", value=covariance_type))
+        raise DamagedError(Message("unknown covariance type {value}", value=quoted(covariance_type)))
     grouped = parameters["preset"] != "paper"
-    arrays = {field.name: _array(content, field) for field in _fields(content, parameters, covariance_type, grouped)}
+    arrays = {
+        field.name: read_array(content, field) for field in _fields(content, parameters, covariance_type, grouped)
+    }
     n_components = len(arrays["weights"])
     if grouped:
         _check_joins(arrays["joins"], n_components)
@@ -123,15 +151,19 @@ def decode(text: str) -> ModelContent:
             _check_groups(arrays, kind, n_components)
     _check_variances(arrays["covariances"], covariance_type)
     if abs(arrays["weights"].sum() - 1) > 1e-6:
-        raise _damaged(Message("the weights do not sum to 1"))
-    try:
-        part_notes = PartNotes.of_json(content)
-    except ValueError as error:
-        raise _damaged(message_of(error)) from error
+        raise DamagedError("the weights do not sum to 1")
+    _check_means(arrays, parameters)
     try:
         check_parameters(parameters)
     except (ValueError, TypeError) as error:
         raise ModelFileError(Message("the model has a bad parameter: {reason}", reason=message_of(error))) from error
+    # Files of versions before this digest have none, and hold all the same.
+    if "digest" in content and content["digest"] != _digest(parameters, covariance_type, arrays):
+        raise DamagedError("its numbers are not those that were saved: were they edited, or taken from another model?")
+    try:
+        part_notes = PartNotes.of_json(content)
+    except ValueError as error:
+        raise DamagedError(message_of(error)) from error
     grouping, traits, atlases = None, None, None
     if grouped:
         grouping = _grouping(arrays)
@@ -167,101 +199,64 @@ def _grouping(arrays: dict[str, FloatArray]) -> MergeTree:
     return replace(tree, natural=natural)
 
 
-class _Field(NamedTuple):
-    """An array of a model file: name, shape, bounds of its numbers, and whether they are whole."""
-
-    name: str
-    shape: tuple[int, ...]
-    least: float = -MOST_NUMBER
-    most: float = MOST_NUMBER
-    whole: bool = False
-
-
 def _fields(
     content: dict[str, Any], parameters: dict[str, Any], covariance_type: CovarianceType, grouped: bool
-) -> Iterator[_Field]:
+) -> Iterator[Field]:
     """All arrays of a model file, with the shapes that its counts give."""
     k, d = _n_components(content, parameters["n_segments"]), parameters["n_energies"]
     covariance_shapes = {"shared": (d,), "diag": (k, d), "spherical": (k,), "tied": (d, d), "full": (k, d, d)}
-    n_poses = _length(content, "usual_scores", MOST_POSES)
+    n_poses = length(content, "usual_scores", MOST_POSES)
     yield from (
-        _Field("centre", (d,)),
-        _Field("spread", (d,), least=LEAST_SPREAD),
-        _Field("weights", (k,), least=_POSITIVE),
-        _Field("means", (k, d)),
-        _Field("covariances", covariance_shapes[covariance_type], -(MOST_NUMBER**2), MOST_NUMBER**2),
-        _Field("usual_scores", (n_poses,)),
+        Field("centre", (d,)),
+        Field("spread", (d,), least=LEAST_SPREAD),
+        Field("weights", (k,), least=POSITIVE),
+        Field("means", (k, d)),
+        Field("covariances", covariance_shapes[covariance_type], -(MOST_NUMBER**2), MOST_NUMBER**2),
+        Field("usual_scores", (n_poses,)),
     )
     if not grouped:
         return
     yield from (
-        _Field("joins", (k - 1, 2)),
-        _Field("certainties", (k,)),
-        _Field("by_chance", (k,)),
+        Field("joins", (k - 1, 2)),
+        Field("certainties", (k,), 0.0, WHOLE_SHARE),
+        Field("by_chance", (k,), 0.0, WHOLE_SHARE),
     )
     if content["version"] == UNIONS_VERSION:
-        yield _Field("cuts", (k,), least=0.0)
+        yield Field("cuts", (k,), least=0.0)
     else:
         n_kinds = content["n_kinds"] if isinstance(content.get("n_kinds"), int) else 0
         yield from (
-            _Field("likeness", (k,)),
-            _Field("n_kinds", (), 1, k, whole=True),
-            _Field("natural", (), 1, k, whole=True),
+            Field("likeness", (k,)),
+            Field("n_kinds", (), 1, k, whole=True),
+            Field("natural", (), 1, k, whole=True),
         )
         if "areas" in content:
             yield _Field("areas", (k,), least=0.0, most=1.0)
         if "kind_mean" in content:
             yield from (
-                _Field("kind_mean", (n_kinds,)),
-                _Field("kind_spread", (n_kinds,), least=LEAST_SPREAD),
-                _Field("kind_touching", (n_kinds, n_kinds), least=_POSITIVE, most=_BELOW_ONE),
+                Field("kind_mean", (n_kinds,)),
+                Field("kind_spread", (n_kinds,), least=LEAST_SPREAD),
+                Field("kind_touching", (n_kinds, n_kinds), least=POSITIVE, most=BELOW_ONE),
             )
     for kind in REGION_KINDS:
-        r = _length(content, f"{kind}_segment", MOST_REGIONS)
+        r = length(content, f"{kind}_segment", MOST_REGIONS)
         yield from (
-            _Field(f"{kind}_groups", (), 1, k, whole=True),
-            _Field(f"{kind}_segment", (r,), 0, k - 1, whole=True),
-            _Field(f"{kind}_side", (r,), -1, 1, whole=True),
-            _Field(f"{kind}_area", (r,), least=_POSITIVE),
-            _Field(f"{kind}_signature", (r, FIELDS)),
-            _Field(f"{kind}_handedness", (r, PLANES)),
-            _Field(f"{kind}_distance", (r, r)),
-            _Field(f"{kind}_noise", (4,), least=_POSITIVE),
+            Field(f"{kind}_groups", (), 1, k, whole=True),
+            Field(f"{kind}_segment", (r,), 0, k - 1, whole=True),
+            Field(f"{kind}_side", (r,), -1, 1, whole=True),
+            Field(f"{kind}_area", (r,), POSITIVE, WHOLE_SHARE),
+            Field(f"{kind}_signature", (r, FIELDS)),
+            Field(f"{kind}_handedness", (r, PLANES)),
+            Field(f"{kind}_distance", (r, r), least=0.0),
+            Field(f"{kind}_noise", (4,), least=POSITIVE),
         )
-
-
-def _array(content: dict[str, Any], field: _Field) -> FloatArray:
-    """An array of a model file, checked against its field."""
-    name = field.name
-    try:
-        array = np.array(content[name], dtype=np.float64)
-    except (KeyError, ValueError, TypeError, OverflowError) as error:
-        raise _damaged(Message("{name} is missing or not numbers", name=name)) from error
-    if array.shape != field.shape:
-        raise _damaged(
-            Message("{name} has the shape {shape}, not {expected}", name=name, shape=array.shape, expected=field.shape)
-        )
-    if not np.isfinite(array).all():
-        raise _damaged(Message("{name} has a number that is not finite", name=name))
-    outside = array[(array < field.least) | (array > field.most) | (field.whole & (array % 1 != 0))]
-    if not outside.size:
-        return array
-    value = float(outside[0])
-    if field.whole:
-        raise _damaged(
-            Message("{name} has the number {value:g}, which is not a whole number from {least:g} to {most:g}",
-                    name=name, value=value, least=field.least, most=field.most)
-        )  # fmt: skip
-    if field.least > 0 and value < field.least:
-        raise _damaged(Message("{name} has a number that is not positive, or far too small", name=name))
-    raise _damaged(Message("{name} has a number of {value:.3g}, too large", name=name, value=value))
 
 
 def _content(text: str) -> dict[str, Any]:
     """The JSON object in a text, if it is a model of this version."""
     try:
-        content = json.loads(text)
-    except (ValueError, RecursionError) as error:
+        content = parsed(text)
+    except DamagedError as error:
         raise ModelFileError(
             Message("this is not a model of WKS Segment: it is not JSON ({reason})", reason=message_of(error))
         ) from error
@@ -270,41 +265,37 @@ def _content(text: str) -> dict[str, Any]:
     version = content.get("version")
     if version not in (UNIONS_VERSION, MODEL_VERSION):
         if isinstance(version, int) and version < MODEL_VERSION:
-            template = "the model has version {version!r}, this program reads {known}: learn it again"
+            template = "the model has version {version}, this program reads {known}: learn it again"
         else:
-            template = "the model has version {version!r}, this program reads {known}: update WKS Segment"
-        raise ModelFileError(Message(template, version=version, known=MODEL_VERSION))
+            template = "the model has version {version}, this program reads {known}: update WKS Segment"
+        raise ModelFileError(Message(template, version=quoted(version), known=MODEL_VERSION))
     return content
 
 
 def _parameters(content: dict[str, Any]) -> dict[str, Any]:
-    """The parameters, of which only names and sizes are checked: they decide what else a file must hold."""
+    """The parameters, of which only names, types and sizes are checked: they decide what else a file must hold."""
     parameters = content.get("parameters")
     if not isinstance(parameters, dict) or set(parameters) != set(PARAMETERS):
-        raise _damaged(Message("its parameters are not {names}", names=", ".join(PARAMETERS)))
-    for name, most in MOST_OF_PARAMETER.items():
-        value = parameters[name]
-        if isinstance(value, int) and value > most:
-            raise _damaged(Message("{name} is {value}, more than {most}", name=name, value=value, most=most))
+        raise DamagedError(Message("its parameters are not {names}", names=", ".join(PARAMETERS)))
+    for name, value in parameters.items():
+        most = MOST_OF_PARAMETER.get(name, MOST_SEED)
+        if type(value) in (int, float) and value > most:
+            raise DamagedError(
+                Message("{name} is {value}, more than {most}", name=name, value=quoted(value), most=most)
+            )
+        if type(value) not in (int, float, str) or quoted(value) != repr(value):
+            raise DamagedError(Message("{name} cannot be {value}", name=name, value=quoted(value)))
     return parameters
 
 
 def _n_components(content: dict[str, Any], n_segments: Any) -> int:
     """Number of components of the mixture, which is the number of weights."""
-    count = _length(content, "weights", MOST_COMPONENTS)
+    count = length(content, "weights", MOST_COMPONENTS)
     if n_segments != "auto" and (not isinstance(n_segments, int) or n_segments > count):
-        raise _damaged(Message("{segments} segments of {count} components", segments=n_segments, count=count))
+        raise DamagedError(
+            Message("{segments} segments of {count} components", segments=quoted(n_segments), count=count)
+        )
     return count
-
-
-def _length(content: dict[str, Any], name: str, most: int) -> int:
-    """Length of a list in a model file, from 1 to a maximum."""
-    numbers = content.get(name)
-    if not isinstance(numbers, list) or len(numbers) > most:
-        raise _damaged(Message("{name} is missing, or has too many numbers", name=name))
-    if not numbers:
-        raise _damaged(Message("{name} is empty", name=name))
-    return len(numbers)
 
 
 def _check_joins(joins: FloatArray, n_components: int) -> None:
@@ -312,7 +303,7 @@ def _check_joins(joins: FloatArray, n_components: int) -> None:
     groups = set(range(n_components))
     for i, j in joins.tolist():
         if not (i in groups and j in groups and i != j):
-            raise _damaged(Message("joins has the pair {i:g}, {j:g}, which cannot be joined", i=i, j=j))
+            raise DamagedError(Message("joins has the pair {i:g}, {j:g}, which cannot be joined", i=i, j=j))
         groups.remove(j)
 
 
@@ -320,7 +311,7 @@ def _check_groups(arrays: dict[str, FloatArray], kind: str, n_components: int) -
     """Each region must belong to one of the groups of its atlas."""
     groups, segment = float(arrays[f"{kind}_groups"]), arrays[f"{kind}_segment"]
     if (segment >= groups).any():
-        raise _damaged(
+        raise DamagedError(
             Message("{name} has a number that is none of {groups:g} groups", name=f"{kind}_segment", groups=groups)
         )
 
@@ -330,17 +321,31 @@ def _check_variances(covariances: FloatArray, covariance_type: CovarianceType) -
     matrices = covariance_type in ("tied", "full")
     variances = np.diagonal(covariances, axis1=-2, axis2=-1) if matrices else covariances
     if variances.min() < LEAST_SPREAD**2:
-        raise _damaged(Message("a variance is not positive, or far too small"))
+        raise DamagedError("a variance is not positive, or far too small")
     if matrices and not (np.linalg.eigvalsh(covariances) > 0).all():
-        raise _damaged(Message("a covariance matrix is not positive definite"))
+        raise DamagedError("a covariance matrix is not positive definite")
 
 
-def _damaged(reason: Message) -> ModelFileError:
-    return ModelFileError(Message("the model is damaged: {reason}", reason=reason))
+def _check_means(arrays: dict[str, FloatArray], parameters: dict[str, Any]) -> None:
+    """No component may be farther away than its share of the standardized samples allows.
+
+    Their mean is 0, and their variance 1, so that a component of weight w lies within 1 / √w. The paper's samples are
+    signatures, which are not negative: a component lies within 1 / w of their mean.
+    """
+    weights = arrays["weights"][:, None]
+    farthest = np.abs(arrays["centre"]) / weights if parameters["preset"] == "paper" else 1 / np.sqrt(weights)
+    if (np.abs(arrays["means"]) > FARTHEST_MEAN * farthest).any():
+        raise DamagedError("means has a number that is far too large for its weight")
+
+
+def _digest(parameters: dict[str, Any], covariance_type: str, arrays: Mapping[str, FloatArray | IntArray]) -> str:
+    """Digest of the arrays, and of the parameters that these depend on."""
+    learned = {name: parameters[name] for name in PARAMETERS if name not in ADJUSTABLE}
+    return digest_of(json.dumps([learned, covariance_type], default=_as_python), arrays)
 
 
 def write(path: str | PathLike[str], text: str) -> None:
-    """Write text to a file; if this fails half-way, an older file is left as it was.
+    """Write text to a file, which appears whole; if this fails, an older file is left as it was.
 
     Raises
     ------
@@ -358,17 +363,7 @@ def write(path: str | PathLike[str], text: str) -> None:
                 most=MAX_BYTES / 2**20,
             )
         )
-    target = Path(path).resolve()
-    if target.exists() and not os.access(target, os.W_OK):
-        raise PermissionError(Message("{path} is write-protected", path=target))
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-    try:
-        with temporary.open("x", encoding="utf-8") as file:
-            file.write(text)
-        os.replace(temporary, target)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
+    write_whole(path, text)
 
 
 def read(path: str | PathLike[str]) -> str:

@@ -1,12 +1,18 @@
 """`wks_segment learn` and `apply`: models, and limits of a job."""
 
 import json
+from dataclasses import replace
+from itertools import count
+from types import SimpleNamespace
 
 import bpy
 import pytest
 from builders import labels_of, limbed
 from command_files import QUICK, assert_fails, empty_scene, mesh_of_scene, save
 
+from wks_segment.blender.cli import resource_limits
+from wks_segment.blender.cli.main import answer
+from wks_segment.blender.workflow import model_ranking
 from wks_segment.core import PoseSegmentation
 
 
@@ -88,3 +94,40 @@ def test_a_job_above_the_limits_is_refused_until_they_are_raised(command, folder
     refused = command(*arguments, "--limit-memory", "0.001")
     assert (refused.code, "0.0 GB: raise the limit" in refused.err) == (1, True)
     assert command(*arguments, "--limit-memory", "64", "--limit-minutes", "60").code == 0
+
+
+def test_limits_that_are_given_hold_for_the_whole_command(command, folder, tmp_path, monkeypatch):
+    """Whatever was estimated: the clock and the memory say something else then."""
+    arguments = ("learn", folder / "pose_0.obj", "--model", tmp_path / "model.json", *QUICK)
+    clock = count(0, 7)
+    monkeypatch.setattr(resource_limits, "time", SimpleNamespace(monotonic=lambda: next(clock)))
+    done = command(*arguments, "--limit-minutes", "0.2", "--json")
+    assert (done.code, "more than 0.2 minutes" in done.result["error"]) == (1, True)
+    monkeypatch.undo()
+    memory = count(10**9, 10**8)
+    monkeypatch.setattr(resource_limits, "resident_memory", lambda pid: next(memory))
+    done = command(*arguments, "--limit-memory", "0.3", "--json")
+    assert (done.code, "more than 0.3 GB of memory" in done.result["error"]) == (1, True)
+    assert "more than 0.3 GB" in answer([str(argument) for argument in (*arguments, "--limit-memory", "0.3")]).error
+    assert not (tmp_path / "model.json").exists()
+    assert command(*arguments).code == 0, "no limit was given"
+
+
+def test_a_model_that_asks_for_thousands_of_eigenpairs(command, folder, tmp_path, model):
+    content = json.loads(model.read_text())
+    content.pop("digest")
+    content["parameters"]["n_eigenpairs"] = 5000
+    (tmp_path / "large.json").write_text(json.dumps(content))
+    done = command("apply", folder / "pose_0.obj", "--model", tmp_path / "large.json", "--output", tmp_path / "a.blend")
+    assert_fails(done, "take about", "minutes", "allowed are 5.0 minutes")
+
+
+def test_apply_says_that_a_model_does_not_fit(command, folder, model, tmp_path, monkeypatch):
+    known = model_ranking.rank
+    monkeypatch.setattr(model_ranking, "rank", lambda *given: replace(known(*given), verdict="nothing fits"))
+    options = ("--model", model, "--output", tmp_path / "out.blend", "--smallest-part", 20, "--json")
+    done = command("apply", folder / "pose_0.obj", *options)
+    assert done.code == 0, done
+    warnings = "\n".join(done.result["warnings"])
+    assert '"model" does not fit' in warnings
+    assert "of the model's 4 segments are not on these objects" in warnings

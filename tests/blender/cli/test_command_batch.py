@@ -1,6 +1,10 @@
 """`wks_segment batch`: the command line with real children."""
 
 import json
+import os
+import shutil
+import sys
+from pathlib import Path
 
 import pytest
 from command_line import QUICK, lines, run, start, wait_for_lines, write
@@ -92,6 +96,31 @@ def test_a_folder_of_models_that_does_not_exist(command, characters, tmp_path):
     done = command("batch", "rank", characters, "--output", tmp_path / "no", "--models", tmp_path / "nowhere")
     assert done.code == 1
     assert "nowhere: there is no such folder" in done.err
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
+def test_a_name_that_is_not_utf_8(command, characters, learned, tmp_path):
+    """It is done or fails by itself; list, report and resuming work for all files."""
+    inputs, out = tmp_path / "in", tmp_path / "out"
+    inputs.mkdir()
+    odd = Path(os.fsdecode(os.fsencode(inputs) + b"/odd\xe9.obj"))
+    shutil.copyfile(characters / "0.obj", odd)
+    shutil.copyfile(characters / "1.obj", inputs / "plain.obj")
+    batch = ("batch", "apply", inputs, "--model", learned[0] / "0.json", "--output", out, "--format", "obj",
+             "--processes", 1, "--no-thumbnails")  # fmt: skip
+    done = command(*batch)
+    listed = {line["name"]: line for line in lines(out)}
+    assert listed["plain"]["status"] == "done"
+    assert listed["odd\udce9"]["input"] == str(odd)
+    assert (out / "report.html").read_text().count("odd") >= 1
+    assert done.code == (0 if listed["odd\udce9"]["status"] == "done" else 1), done
+    done = command(*batch, "--resume", "--json")
+    assert done.result["now"] == 0
+    with (out / "batch.jsonl").open() as log:
+        assert len(log.readlines()) == 2
+    shutil.copyfile(learned[0] / "0.json", odd.with_suffix(".json"))
+    done = command("apply", inputs / "plain.obj", "--model", odd.with_suffix(".json"), "--output", tmp_path / "a.blend")
+    assert done.code == 0, done
 
 
 def test_wrong_usage(command, characters, tmp_path):

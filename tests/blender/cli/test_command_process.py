@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -43,6 +44,22 @@ def test_process_that_fails_ends_with_1(tmp_path):
     assert (done.code, list(done.result)) == (1, ["error"])
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [("--help",), ("segment", "missing.glb"),
+     ("learn", "{walker}", "--frames", "2", "--model", "{out}/model.json", *QUICK),
+     ("batch", "learn", "{walker}", "--frames", "2", "--output", "{out}/models", *QUICK)],
+    ids=lambda arguments: arguments[0],
+)  # fmt: skip
+def test_no_process_leaves_temporary_files(folder, tmp_path, arguments):
+    for name in ("temporary", "out"):
+        (tmp_path / name).mkdir()
+    given = [str(each).format(walker=folder / "walker.blend", out=tmp_path / "out") for each in arguments]
+    done = ended(process(*given, env=os.environ | {"TMPDIR": str(tmp_path / "temporary")}))
+    assert done.code == (1 if "missing.glb" in arguments else 0), done
+    assert not list((tmp_path / "temporary").iterdir())
+
+
 needs_signals = pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send to another process")
 # Processes that a shell starts in the background ignore Ctrl+C, and so may these tests and their processes.
 HEEDS_SIGNALS = {} if os.name == "nt" else {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)}
@@ -58,13 +75,29 @@ def check_interrupted(done, number):
 
 @needs_signals
 @pytest.mark.parametrize("number", ENDS)
-def test_interrupted_process_prints_one_json_object(folder, number):
-    running = process("segment", folder / "walker.blend", "--frames", 20, "--json", **HEEDS_SIGNALS)
+@pytest.mark.parametrize("seconds", [0.2, 0.6, 1.0, 1.5, 2.0])
+def test_process_that_is_interrupted_while_blender_loads(tmp_path, seconds, number):
+    running = process("segment", tmp_path / "missing.glb", "--json", **HEEDS_SIGNALS)
+    time.sleep(seconds)
+    running.send_signal(number)
+    done = ended(running)
+    if done.code == 1:  # it was faster
+        assert done.result == {"error": f"{tmp_path / 'missing.glb'}: there is no such file"}
+    else:
+        check_interrupted(done, number)
+
+
+@needs_signals
+@pytest.mark.parametrize("number", ENDS)
+def test_interrupted_process_prints_one_json_object(folder, tmp_path, number):
+    environment = os.environ | {"TMPDIR": str(tmp_path)}
+    running = process("segment", folder / "walker.blend", "--frames", 20, "--json", env=environment, **HEEDS_SIGNALS)
     for line in running.stderr:
         if "Signature" in line:
             break
     running.send_signal(number)
     check_interrupted(ended(running), number)
+    assert not list(tmp_path.iterdir())
 
 
 @needs_signals

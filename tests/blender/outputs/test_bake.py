@@ -204,6 +204,7 @@ def test_new_labels_keep_the_image_until_it_is_baked_again(labeled):
 
 
 def test_undo_restores_everything(labeled):
+    OPS.refresh_segments()
     before = scene_snapshot()
     bpy.ops.ed.undo_push(message="before")
     OPS.bake()

@@ -34,7 +34,7 @@ WRITERS = {
 
 WRITING = {
     "write", "take_back", "write_labels", "clear_labels", "separate", "unite", "write_id_map", "write_uv_map",
-    "write_outputs", "rewrite_all", "keep", "_keep", "store_active",
+    "write_outputs", "rewrite_all", "change_sets", "enter_origin", "learned", "adjusted", "_keep_model", "store_active",
 }  # fmt: skip
 """Functions of which every line raises in turn: what they call is complete or raises there."""
 
@@ -154,7 +154,7 @@ OPERATORS = {
     "clear of separated objects": (separated_and_cleared, ("separate.py", "id_map.py")),
     "unwrap": (unwrapped, ()),
     "bake": (bake_smaller, ("id_map.py",)),
-    "learn": (learned, ("segmentation_job.py", "pipeline.py", "model_library.py", "live_session.py")),
+    "learn": (learned, ("segmentation_job.py", "pipeline.py", "model_library.py", "carry_over.py", "origin.py")),
     "merge": (lambda: lambda: OPS.merge_segments(into=1), ("segment_list.py", "labels.py")),
     "new segment": (lambda: in_edit_mode(lambda: OPS.new_segment(name="Mine")), ()),
 }

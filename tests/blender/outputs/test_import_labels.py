@@ -25,7 +25,7 @@ def test_corrected_face_sets_become_segments(obj):
     sets = obj.data.attributes[FACE_SETS].data
     sets[0].value, sets[1].value, sets[2].value = sets[len(sets) - 1].value, 90, 95
     expected = labels.copy()
-    expected[:3] = labels[-1], 4, 5
+    expected[:3] = labels[-1], 500, 501
     OPS.segments_from(source="FACE_SETS")
     np.testing.assert_array_equal(labels_of(obj), expected)
 
@@ -39,7 +39,7 @@ def test_corrected_materials_become_segments(obj, settings):
     obj.data.polygons[0].material_index = first + labels[-1]
     obj.data.polygons[1].material_index = first + 4
     expected = labels.copy()
-    expected[:2] = labels[-1], 4
+    expected[:2] = labels[-1], 500
     OPS.segments_from(source="MATERIALS")
     np.testing.assert_array_equal(labels_of(obj), expected)
 

@@ -1,5 +1,7 @@
 """Objects with segments that were duplicated, joined, split or appended: Clear takes back all of ours in each."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
@@ -8,6 +10,10 @@ from painted_objects import FACE_SETS, seams_of, stripes
 
 from wks_segment.blender.outputs.labels import write_labels
 from wks_segment.blender.outputs.options import OutputOptions
+from wks_segment.blender.outputs.origin import Origin, enter_origin
+from wks_segment.blender.outputs.overrides import keep_by_hand_of
+from wks_segment.blender.parts.part_style import SetNotes
+from wks_segment.blender.props.label_set import style_of
 
 pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
@@ -195,6 +201,22 @@ def test_joined_labels_are_listed_and_edited(settings, active):
     OPS.clear()
     assert [material.name for material in obj.data.materials] == [*SKIN, *METAL]
     assert sorted(obj.vertex_groups.keys()) == ["Of A", "Of B"]
+
+
+def test_clear_after_a_join_of_labels_of_two_models(settings):
+    """Groups have the names of their own label set, and faces by hand of a third one have an attribute."""
+    objects = [character("A", SKIN), character("B", METAL)]
+    before = [state(obj)["attributes"] for obj in objects]
+    for obj, labels, name in zip(objects, ("first/3", "second/5"), ("Head", "Tail"), strict=True):
+        settings.keep_notes(SetNotes(names={0: name}), labels)
+        write_labels(obj.data, stripes(obj.data, 3), replace(ALL, style=style_of(labels)))
+        enter_origin(obj.data, Origin(labels))
+    keep_by_hand_of(objects[1].data, "second/4", stripes(objects[1].data))
+    obj = joined(*objects)
+    assert {"WKS Head", "WKS Tail"} <= set(obj.vertex_groups.keys())
+    OPS.clear()
+    assert sorted(obj.vertex_groups.keys()) == ["Of A", "Of B"]
+    assert state(obj)["attributes"] == before[0]
 
 
 def test_a_renamed_material_of_a_joined_object_is_given_back(settings):

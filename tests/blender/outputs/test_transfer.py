@@ -47,6 +47,7 @@ def test_transfer_writes_the_chosen_outputs_and_can_be_undone(settings):
     settings.write_face_sets = settings.write_seams = settings.write_materials = True
     settings.vertex_groups = "hard"
     select(body, coat)
+    OPS.refresh_segments()
     done, left = undone(OPS.transfer)
     assert all("/Body/" not in path for path in done)
     assert any("wks_segment_seam" in path for path in done)

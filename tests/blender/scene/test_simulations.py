@@ -10,10 +10,13 @@ from builders import coordinates, limbed, limbed_rigged, refuses, rig, select
 from painted_objects import stripes
 
 from wks_segment.blender.outputs.labels import write_labels
+from wks_segment.blender.outputs.origin import Origin, enter_origin
 from wks_segment.blender.outputs.overrides import keep_by_hand
+from wks_segment.blender.parts.part_style import SetNotes
 from wks_segment.blender.scene import poses as reader
 from wks_segment.blender.scene.characters import Character
 from wks_segment.blender.workflow import segment_list
+from wks_segment.blender.workflow.live_session import session_of
 
 pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
@@ -158,6 +161,24 @@ def test_no_button_throws_frames_away(settings, change):
     bpy.context.view_layer.update()
     assert (cache_of(obj).info, cache_of(obj).is_outdated) == (before, False)
     assert bpy.context.mode == "OBJECT"
+
+
+@pytest.mark.parametrize(("name", "value"), [("write_seams", True), ("palette", "maximal")])
+def test_no_setting_of_outputs_throws_frames_away(settings, name, value):
+    """They act at once on labels whose model is gone as well; the panel says why an output does not."""
+    obj = simulated("CLOTH")
+    select(obj)
+    settings.keep_notes(SetNotes(), "gone/4")
+    write_labels(obj.data, stripes(obj.data))
+    enter_origin(obj.data, Origin("gone/4"))
+    play()
+    bpy.context.scene.frame_set(5)
+    before = cache_of(obj).info
+    assert before.startswith(f"{LAST} frames")
+    setattr(settings, name, value)
+    bpy.context.view_layer.update()
+    assert (cache_of(obj).info, cache_of(obj).is_outdated) == (before, False)
+    assert ("Bake it first" in session_of(bpy.context).message) == (name == "write_seams")
 
 
 def test_an_outdated_simulation_is_no_reason(settings):

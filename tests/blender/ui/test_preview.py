@@ -52,7 +52,7 @@ def test_preview_is_not_written(walker, settings, session):
 def test_accept_writes_the_preview(walker, settings, session):
     settings.n_segments = 2
     rest(session)
-    shown = next(iter(session.proposed[1].labels.values()))
+    shown = next(iter(session.proposed[1].jobs[0].labels.values()))
     assert OPS.accept() == {"FINISHED"}
     np.testing.assert_array_equal(labels_of(walker), shown)
     assert set(shown) == {0, 1}
@@ -120,7 +120,7 @@ def test_preview_matches_the_evaluated_surface(walker, settings, session):
     job = session.job
     (character,) = {pose.character for pose in job.poses}
     labels = np.arange(len(walker.data.polygons)) % 3
-    places, colors = preview_triangles(bpy.context, {character: labels})
+    places, colors = preview_triangles(bpy.context, {character: labels}, {})
     evaluated = walker.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
     seen = np.array([vertex.co for vertex in evaluated.vertices])
     assert len(places) == 3 * 2 * 3 * len(walker.data.polygons)  # three quads for each triangle
@@ -135,6 +135,6 @@ def test_preview_matches_the_evaluated_surface(walker, settings, session):
 
 
 def test_preview_of_nothing_is_empty():
-    places, colors = preview_triangles(bpy.context, {})
+    places, colors = preview_triangles(bpy.context, {}, {})
     assert places.shape == (0, 3)
     assert colors.shape == (0, 4)

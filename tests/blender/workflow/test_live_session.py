@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 import pytest
-from builders import changes, coordinates, labels_of, limbed_poses, limbed_rigged, select, snapshot
+from builders import changes, labels_of, limbed_poses, limbed_rigged, select, snapshot
 from live_settings import rest
 
 from wks_segment.blender.workflow import live_session as module
@@ -110,13 +110,14 @@ def test_applied_labels_and_model_follow(walker, settings, session, fits):
     assert fits["fit"] == 0
 
 
-def test_smoothness_keeps_the_models_number_of_segments(walker, settings, session):
-    """A model of four segments is applied while the setting says seven: smoothness alone must not make it seven."""
-    settings.live, settings.n_segments = False, 7
+def test_model_is_applied_with_the_number_in_the_field(walker, settings, session):
+    settings.live, settings.n_segments = False, 2
     assert OPS.apply() == {"FINISHED"}
+    assert set(labels_of(walker)) == {0, 1}
     settings.live, settings.smoothness = True, 1.5
     rest(session)
-    assert labels_of(walker).max() == 3
+    assert set(labels_of(walker)) == {0, 1}
+    assert settings.models[0].n_segments == 2
 
 
 def test_all_objects_follow_when_objects_are_poses(session, settings):
@@ -174,11 +175,21 @@ def test_edited_mesh_is_not_written(walker, settings, session):
     assert session.job is None
 
 
-def test_removed_object_drops_the_job(walker, settings, session):
+def test_removed_object_has_nothing_to_follow(walker, settings, session):
     bpy.data.objects.remove(walker)
     settings.n_segments = 2
+    assert not session.is_scheduled
+    assert not OPS.update.poll()
+
+
+def test_removed_pose_of_a_job_drops_the_job(session, settings):
+    poses = limbed_poses(0.0, 0.5)
+    select(*poses)
+    OPS.learn()
+    bpy.data.objects.remove(poses[1])
+    settings.n_segments = 2
     rest(session)
-    assert '"Walker" was deleted' in session.message
+    assert '"Pose 1" was deleted' in session.message
     assert session.job is None
 
 
@@ -192,17 +203,23 @@ def test_labels_do_not_follow_in_edit_mode(walker, settings, session):
     assert set(labels_of(walker)) == {0, 1}
 
 
-@pytest.mark.parametrize("how", ["clear", "load_model"])
-def test_labels_do_not_follow_after_clear_or_another_model(walker, settings, session, tmp_path, how):
-    OPS.save_model(filepath=str(tmp_path / "model.json"))
-    if how == "clear":
-        OPS.clear()
-    else:
-        OPS.load_model(filepath=str(tmp_path / "model.json"))
+def test_labels_do_not_follow_after_clear(walker, settings, session):
+    OPS.clear()
     before = snapshot(walker.data)
     settings.n_segments = 2
     rest(session)
     assert not changes(before, snapshot(walker.data))
+
+
+def test_labels_follow_by_their_own_model_whichever_is_in_use(walker, settings, session, tmp_path):
+    OPS.save_model(filepath=str(tmp_path / "model.json"))
+    OPS.load_model(filepath=str(tmp_path / "model.json"))
+    imported = settings.model
+    settings.n_segments = 2
+    rest(session)
+    assert set(labels_of(walker)) == {0, 1}
+    assert settings.model == imported
+    assert [row.n_segments for row in settings.models] == [2, 4]
 
 
 def test_opening_a_file_drops_the_job(walker, session, tmp_path):
@@ -212,8 +229,14 @@ def test_opening_a_file_drops_the_job(walker, session, tmp_path):
     assert session.job is None
     bpy.context.scene.wks_segment.n_segments = 2
     rest(session)
-    assert labels_of(bpy.data.objects["Walker"]).max() == 3
-    assert not OPS.update.poll()
+    walker = bpy.data.objects["Walker"]
+    assert labels_of(walker).max() == 3
+    # One press of the button computes what Live needs.
+    assert OPS.update() == {"FINISHED"}
+    assert set(labels_of(walker)) == {0, 1}
+    bpy.context.scene.wks_segment.n_segments = 4
+    rest(session)
+    assert labels_of(walker).max() == 3
 
 
 def test_paper_method_keeps_its_number_of_segments(session, settings):
@@ -235,5 +258,7 @@ def test_large_job_is_not_kept(session, settings, monkeypatch):
     settings.source, settings.pose_count = "FRAMES", 2
     assert OPS.learn() == {"FINISHED"}
     assert session.job is None
-    assert coordinates(obj.data).shape[1] == 3
-    assert not OPS.update.poll()
+    settings.n_segments = 2
+    assert not session.is_scheduled
+    assert OPS.update() == {"FINISHED"}
+    assert set(labels_of(obj)) == {0, 1}

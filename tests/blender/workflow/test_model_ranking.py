@@ -1,12 +1,15 @@
 """Which model fits: in the window's list, on the command line, and the paper's protocol on a folder."""
 
+from types import SimpleNamespace
 from unittest.mock import MagicMock
 
 import bpy
 import numpy as np
 import pytest
 from builders import changes, labels_of, limbed, limbed_rigged, mesh_object, scene_snapshot, select
+from live_settings import click
 
+from wks_segment.blender.operators import save_model
 from wks_segment.blender.ui import models_panel
 from wks_segment.blender.workflow import model_library, model_ranking
 from wks_segment.core import PoseSegmentation
@@ -67,6 +70,7 @@ def test_best_model_is_applied_by_one_click(two):
 
 def test_applying_a_ranked_model_is_one_undo_step(two):
     OPS.rank()
+    click(bpy.data.objects["Unseen"])
     bpy.ops.ed.undo_push(message="ranked")
     before = scene_snapshot()
     OPS.apply_ranked(index=0)
@@ -249,3 +253,43 @@ def test_unreadable_model_is_left_out(two):
     assert [item.name for item in two.ranking] == ["Box"]
     assert PoseSegmentation.from_json(two.model)
     assert dict(model_library.all_of(two)).keys() == {"Limbed", "Box"}
+
+
+def test_copies_of_a_model_count_once(two):
+    two.active_model = 0
+    for _ in range(2):
+        OPS.duplicate_model()
+        two.n_segments = 3
+        OPS.apply()
+    click(bpy.data.objects["Unseen"])
+    assert OPS.rank() == {"FINISHED"}
+    assert [item.name for item in two.ranking] == ["Limbed", "Box"]
+    assert two.ranking[0].probability > 0.95
+
+
+def test_applying_a_model_that_does_not_fit_says_so(two, printed):
+    printed()
+    assert OPS.apply() == {"FINISHED"}
+    assert '"Box" does not fit "Unseen": "Limbed" fits better' in printed().out
+    two.active_model = 0
+    assert OPS.apply() == {"FINISHED"}
+    assert "fit" not in printed().out
+
+
+def test_missing_segments_of_an_applied_model_are_explained(two, printed):
+    two.active_model = 0
+    two.min_share = 20.0
+    printed()
+    assert OPS.apply() == {"FINISHED"}
+    assert "of the model's 4 segments are not on these objects" in printed().out
+
+
+def test_export_proposes_the_name_of_the_model(two, monkeypatch):
+    two.models[1].name = "Long Box/2"
+    operator = SimpleNamespace(filepath="", filename_ext=".json")
+    cls = save_model.WKS_SEGMENT_OT_save_model
+    monkeypatch.setattr(
+        save_model, "super", lambda: SimpleNamespace(invoke=lambda *_: {"RUNNING_MODAL"}), raising=False
+    )
+    assert cls.invoke(operator, bpy.context, None) == {"RUNNING_MODAL"}
+    assert operator.filepath == "Long_Box_2.json"

@@ -23,6 +23,7 @@ from height_bands import (
     coordinates_of_faces,
     groups_of,
     in_object_mode,
+    style_on,
     write,
     write_labels,
 )
@@ -265,8 +266,8 @@ def test_names_colors_and_faces_by_hand_are_carried_over(settings):
     other = np.where(labels == 0, 4, np.where(labels == 1, 0, 1))
     other[labels == 1002] = np.arange((labels == 1002).sum()) % 5 + 5
     character = Character((obj,))
-    write_labels(settings, {character: other}, renumbered=True)
-    notes = settings.notes()
+    write_labels(settings, {character: other}, of="other/10")
+    notes = settings.notes("other/10")
     assert notes.names[4] == "Legs"
     assert notes.colors == {0: pytest.approx(RED)}
     assert "Hand.L" not in notes.names.values()
@@ -284,6 +285,6 @@ def test_faces_by_hand_without_a_successor_become_a_part(settings):
     OPS.assign_faces()
     bpy.ops.object.mode_set(mode="OBJECT")
     other = np.arange(len(chosen)) % 3
-    write_labels(settings, {Character((obj,)): other}, renumbered=True)
+    write_labels(settings, {Character((obj,)): other}, of="other/3")
     np.testing.assert_array_equal(labels_of(obj), np.where(chosen, 500, other))
-    assert settings.style().name_of(500) == "Legs"
+    assert style_on(obj).name_of(500) == "Legs"

@@ -12,14 +12,16 @@ from builders import (
     limbed,
     limbed_poses,
     listed,
+    rig,
     select,
 )
 from height_bands import RED, activate, all_agrees, bands, colors_at, groups_of, write
 
 from wks_segment.blender import registration
 from wks_segment.blender.parts.palette import palette
+from wks_segment.blender.parts.part_style import SetNotes
 from wks_segment.blender.ui import segments_panel
-from wks_segment.core import PartNotes, PoseSegmentation
+from wks_segment.core import PoseSegmentation
 
 pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
@@ -28,31 +30,28 @@ OPS = bpy.ops.wks_segment
 def test_list_shows_parts_with_shares_of_the_area(pair, settings):
     assert [item.name for item in settings.segments] == ["Segment 1", "Segment 2", "Segment 3.L", "Segment 3.R"]
     areas = {}
-    for obj in pair:
-        for polygon, part in zip(obj.data.polygons, labels_of(obj).tolist(), strict=True):
-            areas[part] = areas.get(part, 0) + polygon.area
+    for polygon, part in zip(pair[0].data.polygons, labels_of(pair[0]).tolist(), strict=True):
+        areas[part] = areas.get(part, 0) + polygon.area
     for item in settings.segments:
         assert item.share == pytest.approx(100 * areas[item.number] / sum(areas.values()), rel=1e-4)
         assert not item.hidden
     np.testing.assert_allclose(settings.segments[0].color, palette()[0], atol=1e-3)
 
 
-def test_shares_are_of_selected_objects_or_of_all(pair, settings):
-    both = [item.share for item in settings.segments]
+def test_shares_are_of_the_active_character(pair, settings):
     pair[1].scale = (3, 3, 3)
+    shares = []
+    for first, second in (pair, pair[::-1]):
+        select(first, second)
+        OPS.refresh_segments()
+        shares.append([item.share for item in settings.segments])
+    assert shares[0] != pytest.approx(shares[1], rel=1e-4)
+    rig(pair)
     select(pair[0])
     OPS.refresh_segments()
-    first = [item.share for item in settings.segments]
-    select()
-    OPS.refresh_segments()
-    weighted = [item.share for item in settings.segments]
-    assert first != pytest.approx(both, rel=1e-4)
-    select(pair[1])
-    OPS.refresh_segments()
-    second = [item.share for item in settings.segments]
     area = [sum(polygon.area for polygon in obj.data.polygons) for obj in pair]
-    expected = (area[0] * np.array(first) + 9 * area[1] * np.array(second)) / (area[0] + 9 * area[1])
-    assert weighted == pytest.approx(expected, rel=1e-4)
+    expected = (area[0] * np.array(shares[0]) + 9 * area[1] * np.array(shares[1])) / (area[0] + 9 * area[1])
+    assert [item.share for item in settings.segments] == pytest.approx(expected, rel=1e-4)
 
 
 def test_learn_apply_and_clear_fill_the_list(settings):
@@ -100,7 +99,8 @@ def test_names_are_unique_and_an_empty_one_restores_the_number(pair, settings):
     long = "x" * 80
     activate(settings, 1002).name = long
     assert [item.name for item in settings.segments][2:] == ["x" * 48 + ".L", "x" * 48 + ".R"]
-    assert PartNotes.of_json(json.loads(settings.part_notes)) == settings.notes() != PartNotes()
+    notes = settings.notes("bands/3")
+    assert SetNotes.of_json(json.loads(settings.label_sets["bands/3"].notes)) == notes != SetNotes()
 
 
 def test_new_color_is_written_everywhere_for_that_part_only(pair, settings):

@@ -206,13 +206,13 @@ def test_cache_that_cannot_be_written_gives_a_warning_and_the_result(tmp_path):
 
 def test_old_unfinished_files_are_removed(tmp_path):
     cache, (one,) = DiskCache(tmp_path), described(0.0)
-    old, new = tmp_path / "old.part", tmp_path / "new.part"
+    old, new = tmp_path / ".wks_segment-old.npz", tmp_path / ".wks_segment-new.npz"
     for path in (old, new):
         path.write_bytes(b"half")
     long_ago = time.time() - 7200
     os.utime(old, (long_ago, long_ago))
     cache.put("one", one)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["new.part", "one.npz"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".wks_segment-new.npz", "one.npz"]
 
 
 def write_often(folder, limit, seed):
@@ -245,8 +245,8 @@ def test_a_file_of_another_user_is_found(tmp_path, monkeypatch):
 
     cache = Counting(DiskCache(tmp_path))
     PoseSegmentation(**SMALL).describe_all([POSE], cache=cache)
-    (tmp_path / "abandoned.part").touch()
-    os.utime(tmp_path / "abandoned.part", (0, 0))
+    (tmp_path / ".wks_segment-abandoned.npz").touch()
+    os.utime(tmp_path / ".wks_segment-abandoned.npz", (0, 0))
     monkeypatch.setattr(os, "utime", forbidden)
     monkeypatch.setattr("pathlib.Path.unlink", forbidden)
     PoseSegmentation(**SMALL).describe_all([POSE, OTHER], cache=cache)
@@ -345,6 +345,50 @@ def test_damaged_files_are_computed_again(tmp_path):
     for path in tmp_path.glob("*.npz"):
         path.write_bytes(path.read_bytes()[:-200])
     assert PoseSegmentation(**SMALL).fit(POSES, cache=cache).to_json() == model.to_json()
+
+
+def test_entries_that_took_each_others_names_are_computed_again(tmp_path):
+    cache = DiskCache(tmp_path)
+    model = PoseSegmentation(**SMALL).fit(POSES, cache=cache)
+    files = sorted(tmp_path.glob("*.npz"))
+    for a, b in zip(files, [*files[1:], files[0]], strict=True):
+        a.rename(b.with_suffix(".new"))
+    for path in tmp_path.glob("*.new"):
+        path.rename(path.with_suffix(".npz"))
+    assert PoseSegmentation(**SMALL).fit(POSES, cache=cache).to_json() == model.to_json()
+    counting = Counting(DiskCache(tmp_path))
+    PoseSegmentation(**SMALL).fit(POSES, cache=counting)
+    assert counting.hits == len(POSES), "they were not replaced"
+
+
+def test_an_altered_entry_counts_as_missing(tmp_path):
+    cache, (one,) = DiskCache(tmp_path), described(0.0)
+    cache.put("one", one)
+    with np.load(tmp_path / "one.npz") as file:
+        arrays = dict(file)
+    for name in arrays:
+        changed = arrays[name].astype(float) + 1 if name != "digest" else np.array("0" * 40)
+        np.savez(tmp_path / "one.npz", **arrays | {name: changed})
+        assert cache.get("one") is None, name
+    np.savez(tmp_path / "one.npz", **{name: array for name, array in arrays.items() if name != "digest"})
+    assert cache.get("one") is None, "an entry of an earlier version"
+    np.savez(tmp_path / "one.npz", **arrays)
+    assert same(cache.get("one"), one)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no pipes with names")
+@pytest.mark.timeout(60)
+def test_pipes_and_folders_in_the_place_of_entries_are_skipped(tmp_path):
+    model = PoseSegmentation(**SMALL).fit(POSES, cache=DiskCache(tmp_path)).to_json()
+    files = list(tmp_path.glob("*.npz"))
+    for make in (os.mkfifo, os.mkdir):
+        for path in files:
+            path.unlink()
+            make(path)
+        assert PoseSegmentation(**SMALL).fit(POSES, cache=DiskCache(tmp_path, 1000)).to_json() == model
+        if make is os.mkfifo:
+            assert not any(path.is_fifo() for path in tmp_path.iterdir()), "replaced"
+            PoseSegmentation(**SMALL).fit(POSES, cache=DiskCache(tmp_path))
 
 
 def test_parts_that_cannot_be_kept_give_a_warning_and_the_model():

@@ -6,7 +6,6 @@ An option that stands for a setting takes its help, limits and default from the 
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -16,7 +15,7 @@ from ...core.poses.signature_cache import DISK
 from ..errors import UserError
 from ..props.settings import WKSSegmentSettings
 from ..scene import file_formats
-from .option_types import frame_range, number_or_auto, number_within, several_of
+from .option_types import frame_range, named_path, number_or_auto, number_within, several_of
 
 SEGMENTATION_OPTIONS = {
     "--segments": "n_segments",
@@ -59,7 +58,7 @@ AUTO_SETTINGS = {"n_segments": "auto_segments"}
 
 def add_poses(parser: argparse.ArgumentParser, nargs: str = "+") -> None:
     """Add the files to read, and the options that say where the poses in them are."""
-    parser.add_argument("files", type=Path, nargs=nargs, metavar="FILE", help=", ".join(file_formats.IMPORTERS))
+    parser.add_argument("files", type=named_path, nargs=nargs, metavar="FILE", help=", ".join(file_formats.IMPORTERS))
     add_pose_sources(parser)
 
 
@@ -92,9 +91,9 @@ def add_object(parser: argparse.ArgumentParser) -> None:
 def add_outputs(parser: argparse.ArgumentParser) -> None:
     """Add the files to write labels to, and the options that say how labels are written."""
     parser.add_argument(
-        "--output", type=Path, help=f"write the scene to this file ({', '.join(file_formats.EXPORTERS)})"
+        "--output", type=named_path, help=f"write the scene to this file ({', '.join(file_formats.EXPORTERS)})"
     )
-    parser.add_argument("--render", type=Path, metavar="PNG", help="write a picture of all poses side by side")
+    parser.add_argument("--render", type=named_path, metavar="PNG", help="write a picture of all poses side by side")
     add_output_settings(parser)
 
 
@@ -108,7 +107,7 @@ def add_output_settings(parser: argparse.ArgumentParser) -> None:
 def add_cache(parser: argparse.ArgumentParser) -> None:
     """Add the options of the cache for signatures."""
     parser.add_argument(
-        "--cache", type=Path, metavar="DIR",
+        "--cache", type=named_path, metavar="DIR",
         help="keep signatures in this folder, for later runs with the same poses; several runs may share it",
     )  # fmt: skip
     parser.add_argument(
@@ -129,8 +128,10 @@ def add_resources(parser: argparse.ArgumentParser) -> None:
 def add_model(parser: argparse.ArgumentParser) -> None:
     """Add the options that say which model is applied."""
     model = parser.add_mutually_exclusive_group(required=True)
-    model.add_argument("--model", type=Path, help="a model that learn or segment wrote")
-    model.add_argument("--models", type=Path, metavar="DIR", help="a folder of models, of which the best one is used")
+    model.add_argument("--model", type=named_path, help="a model that learn or segment wrote")
+    model.add_argument(
+        "--models", type=named_path, metavar="DIR", help="a folder of models, of which the best one is used"
+    )
 
 
 def add_labeling_settings(parser: argparse.ArgumentParser) -> None:

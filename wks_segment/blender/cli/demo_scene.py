@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import numpy as np
 from ...core import PoseSegmentation
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ..errors import UserError
+from ..outputs.origin import Origin
 from ..props.settings import WKSSegmentSettings
 from ..render.contact_sheet import Tile, render_poses
 from ..scene import file_formats
@@ -21,6 +23,7 @@ from ..scene.characters import Character
 from ..scene.poses import Pose
 from ..workflow import describing, model_library, pipeline
 from ..workflow.describing import Run
+from ..workflow.followed_settings import values_of
 from ..workflow.pipeline import LabelRequest
 from ..workflow.report import pose_warnings, shape_warnings
 from .creature import FIRST_FRAME, LAST_FRAME, build_creature
@@ -88,8 +91,6 @@ class Demo:
             ]
             render_poses([Tile(*row) for row in zip(poses, labels, captions, strict=True)], paths["picture"])
         save_model(model, paths["model"])
-        summary = [f"From {self.character.name}", *run.report.facts[:3]]
-        model_library.keep(settings, model, summary, self.character.name, add=True)
         file_formats.save_scene(paths["scene"])
         return {
             "poses": [
@@ -144,8 +145,11 @@ class Demo:
         learned = run.with_progress(run.progress.part(LEARNED_SHARE, LEARNED_SHARE))
         together = pipeline.label(model, training, described, request, learned)
         weights = pipeline.soften(model, training, described, together, request, learned)
-        model_library.store_active(settings)
-        pipeline.write_outputs(settings, together, request, run.report, weights, renumbered=True)
+        summary = [f"From {self.character.name}", *run.report.facts[:3]]
+        names = [member.name for member in self.character.members]
+        key = model_library.learned(settings, copy(model), summary, names, self.character.name)
+        origin = Origin(key, values_of(settings))
+        pipeline.write_outputs(settings, together, request, run.report, weights, origin)
         written = run.report.n_segments, run.report.parts
 
         described += describing.describe(

@@ -8,15 +8,18 @@ import math
 import signal
 import sys
 import traceback
-from pathlib import Path
+from functools import cache
 from typing import Any, NoReturn
 
 from ...batch import CHILD_COMMAND, Answer, serve
+from ...core.files.whole_file import is_disk_full
 from ...core.progress import Progress
 from ...interruption import Interrupted, handled, interruptible
 from ..errors import UserError
 from ..streams import flush_streams
 from .commands import apply, bake, batch, demo, rank, segment
+from .option_types import named_path
+from .resource_limits import within_limits
 from .results import result_text
 from .terminal import only_result_on_stdout, terminal_progress
 
@@ -65,13 +68,16 @@ def run(arguments: list[str]) -> int:
         if as_json:
             print(json.dumps(result))
         return code
-    with only_result_on_stdout() as stdout:
-        code, result, text = _ended(options)
-        with handled(signal.SIG_IGN):  # the command has ended
-            if as_json:
-                print(json.dumps(_strictly(result), default=str), file=stdout)
-            elif text:
-                print(text, file=stdout)
+    try:
+        with only_result_on_stdout() as stdout:
+            code, result, text = _ended(options)
+            with handled(signal.SIG_IGN):  # the command has ended
+                if as_json:
+                    print(json.dumps(_strictly(result), default=str), file=stdout, flush=True)
+                elif text:
+                    print(text, file=stdout, flush=True)
+    except OSError as error:
+        return _failure(f"the result cannot be printed: {error.strerror}")[0]
     return code
 
 
@@ -79,7 +85,7 @@ def _ended(options: argparse.Namespace) -> tuple[int, dict[str, Any], str]:
     """Run a command; its exit code, its result or the reason why there is none, and the result as text."""
     try:
         with interruptible(), terminal_progress() as progress:
-            result = options.run(options, progress)
+            result = options.run(options, within_limits(progress, options))
         code = int(bool(result.get("failed")))  # files of a batch
         return code, result, "" if options.json else options.text(result)
     except UsageError as error:
@@ -109,8 +115,9 @@ def reason_of(error: BaseException) -> str | None:
     """What an error tells a user; None if it was not foreseen, so that only its traceback says where it is from."""
     if isinstance(error, UserError):
         return str(error)
-    if isinstance(error, OSError) and error.filename is not None and error.strerror:
-        return f"{error.filename}: {error.strerror}"
+    if isinstance(error, OSError) and error.strerror:
+        name = "a file cannot be read or written" if error.filename is None else error.filename
+        return f"{name}: {error.strerror}"
     if isinstance(error, MemoryError):
         return "there is not enough memory: take fewer poses or eigenpairs, or end other programs"
     return None
@@ -129,23 +136,24 @@ def answer(arguments: list[str]) -> Answer:
     """Run one command of a batch in this process, without output on the terminal."""
     try:
         options = _parser().parse_args(arguments)
-        return Answer(_strictly(options.run(options, Progress())))
+        return Answer(_strictly(options.run(options, within_limits(Progress(), options))))
     except UsageError as error:
         return Answer(None, f"wrong usage: {error}")
     except Exception as error:
         reason = reason_of(error)
         if reason is None:
             raise
-        return Answer(None, reason)
+        return Answer(None, reason, is_disk_full(error))
 
 
+@cache  # it takes 25 ms, as long as the rest of a refused file in a batch
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="wks_segment", description="The same parts, labels and colors in every pose of a character.")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for module in COMMAND_MODULES:
         module.add(commands)
     child = commands.add_parser(CHILD_COMMAND)  # not in the help: a batch starts its children with it
-    child.add_argument("folder", type=Path)
+    child.add_argument("folder", type=named_path)
     child.set_defaults(run=_serve, text=_no_text)
     for command in commands.choices.values():
         command.add_argument("--json", action="store_true", help="print one JSON object")

@@ -4,7 +4,20 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
+
+
+def named_path(text: str) -> Path:
+    """A path; no text would stand for the current folder, and is mostly a variable that was never set."""
+    return Path(named(text))
+
+
+def named(text: str) -> str:
+    """A text that is not empty."""
+    if not text:
+        raise argparse.ArgumentTypeError("the name is empty: is a variable not set?")
+    return text
 
 
 def number_within(number: type[int] | type[float], least: float, most: float) -> Any:

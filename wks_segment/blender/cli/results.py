@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ...core import PartNotes, PoseSegmentation
+from ...core import PoseSegmentation
 from ...core.message import message_of
 from ..errors import UserError
+from ..outputs.origin import Origin
 from ..outputs.overrides import merge_parts
 from ..parts import part_ids
 from ..props.settings import WKSSegmentSettings
@@ -18,6 +19,7 @@ from ..scene import file_formats
 from ..scene.poses import Pose
 from ..workflow import pipeline
 from ..workflow.describing import Run
+from ..workflow.followed_settings import values_of
 from ..workflow.pipeline import LabelRequest
 from ..workflow.report import Report
 from .terminal import table
@@ -43,20 +45,16 @@ def check_picture(path: Path) -> None:
 
 def label_and_write(
     model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[Any], settings: WKSSegmentSettings,
-    options: argparse.Namespace, run: Run, renumbered: bool = False,
+    options: argparse.Namespace, run: Run,
 ) -> None:  # fmt: skip
-    """Label poses; write the labels to the meshes and a picture, if the options ask for a scene and for a picture.
-
-    See `pipeline.write_outputs` for `renumbered`.
-    """
+    """Label poses by the model in use; write the labels to the meshes and a picture, if the options ask for these."""
     request = LabelRequest.of(settings, (pose.character for pose in poses))
     parts = [run.with_progress(run.progress.part(*ends)) for ends in ((0.0, LABELED), (LABELED, SOFTENED))]
     labels = pipeline.label(model, poses, described, request, parts[0])
     if options.output:
         weights = pipeline.soften(model, poses, described, labels, request, parts[1])
-        pipeline.write_outputs(settings, labels, request, run.report, weights, renumbered)
-    elif renumbered:
-        settings.keep_notes(PartNotes())
+        origin = Origin(settings.labels(), values_of(settings))
+        pipeline.write_outputs(settings, labels, request, run.report, weights, origin)
     if options.render:
         run.progress(SOFTENED, "Picture")
         with run.report.stage("render"):
@@ -72,9 +70,7 @@ def save_model(model: PoseSegmentation, path: Path) -> None:
     except ValueError as error:
         raise UserError("{path}: {reason}", path=path, reason=message_of(error)) from error
     except OSError as error:
-        raise UserError(
-            "{path}: the model could not be written: {reason}", path=path, reason=error.strerror or error
-        ) from error
+        raise file_formats.not_written(path, error) from error
 
 
 def result_of(options: argparse.Namespace, report: Report) -> dict[str, Any]:

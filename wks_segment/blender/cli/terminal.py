@@ -56,7 +56,7 @@ def only_result_on_stdout() -> Iterator[TextIO]:
     real = os.dup(1)
     os.dup2(2, 1)
     try:
-        with os.fdopen(os.dup(real), "w", encoding="utf-8") as result:
+        with os.fdopen(os.dup(real), "w", encoding="utf-8", errors="surrogateescape") as result:
             yield result
     finally:
         flush_streams()  # text of Blender that is still in a buffer would follow the result

@@ -5,6 +5,7 @@ A job runs in a thread while the window stays responsive, or at once if a script
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import ClassVar, Generic, Protocol, TypeVar
 
@@ -16,7 +17,6 @@ from ...core.message import Message, message_of
 from ...core.progress import Progress
 from ..errors import ChangedError, EndedError, TooLargeError, UserError
 from ..props.settings import LABEL_SETTINGS, WKSSegmentSettings
-from ..scene.change_guard import ChangeGuard
 from ..scene.poses import Pose
 from ..ui.messages import in_panel
 from ..workflow import pipeline
@@ -71,11 +71,23 @@ class BaseOperator:
         return {"CANCELLED"}
 
 
+class Guard(Protocol):
+    """What says whether the scene has changed since a job was read."""
+
+    def check_quickly(self) -> None:
+        """Raise ChangedError if a change can be seen without reading meshes."""
+
+
 class ComputedJob(Protocol):
     """What an operator computes in a thread, between reading from Blender and writing to it."""
 
-    poses: list[Pose]
-    guard: ChangeGuard
+    @property
+    def poses(self) -> Sequence[Pose]:
+        """The poses that signatures are needed of."""
+
+    @property
+    def guard(self) -> Guard:
+        """What says whether the scene has changed."""
 
     @property
     def model(self) -> PoseSegmentation:
@@ -248,7 +260,9 @@ class LabelOperator(JobOperator[SegmentationJob]):
 
     def write_result(self, context: bpy.types.Context) -> set[str]:
         """Write the labels and report them."""
-        session_of(context).write(self.job)
+        session = session_of(context)
+        session.write(self.job)
+        session.follow(context.scene)  # settings can have been changed while the job ran
         if self.job.request.outputs.colors:
             _report.show_colors(context)
         return _report.finish(self, self.verb, self.job.report)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from pathlib import Path
 
 import bpy
@@ -9,6 +10,7 @@ from bpy.props import IntProperty
 
 from ...core.message import Message
 from ..errors import UserError
+from ..parts import part_ids
 from ..workflow import model_library
 from ..workflow.live_session import session_of
 from ..workflow.model_ranking import ranked_objects
@@ -48,7 +50,9 @@ class WKS_SEGMENT_OT_apply_ranked(LabelOperator, bpy.types.Operator):
             if item.name not in texts:
                 raise UserError('The model "{name}" is gone: rank the models again', name=item.name)
             model = model_library.from_text(texts[item.name])
-        return SegmentationJob.applying(context, session_of(context).cache, model, ranked_objects(context))
+        row = settings.models.get(item.name) if not item.path else None
+        uid = "" if row is None else row.uid
+        return SegmentationJob.applying(context, session_of(context).cache, model, ranked_objects(context), uid)
 
     def write_result(self, context: bpy.types.Context) -> set[str]:
         """Use the model, write the labels and report them."""
@@ -60,7 +64,8 @@ class WKS_SEGMENT_OT_apply_ranked(LabelOperator, bpy.types.Operator):
         else:
             model, file = self.job.model, Path(item.path).name
             summary = [Message("From {names}", names=file), Message("{count} segments", count=model.n_segments_)]
-            model_library.add_model(settings, model, item.name, summary)
+            labels = model_library.add_model(settings, copy(model), item.name, summary)
+            self.job.uid = part_ids.model_of(labels)
             # The model is in the scene now, under a name that may have got a number.
             item.name, item.path = settings.models[settings.used_model].name, ""
         return super().write_result(context)

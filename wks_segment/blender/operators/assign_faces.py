@@ -68,7 +68,7 @@ class WKS_SEGMENT_OT_forget_faces(BaseOperator, bpy.types.Operator):
                 forgotten = (parts >= 0) & (read_bools(mesh.polygons, "select") | (not selected_only))
                 count += int(forgotten.sum())
                 keep_by_hand(mesh, np.where(forgotten, -1, parts))
-            warnings = segment_list.rewrite_all(settings, objects)
+            warnings = segment_list.rewrite_all(settings, segment_list.active_labels(settings), objects)
         _report.tell(self, {"INFO"}, Message("{count} faces have the segment of the model again", count=count))
         _report.tell_warnings(self, warnings)
         return {"FINISHED"}
@@ -77,6 +77,7 @@ class WKS_SEGMENT_OT_forget_faces(BaseOperator, bpy.types.Operator):
 def _assign(operator: bpy.types.Operator, context: bpy.types.Context, part: int | None, name: str = "") -> set[str]:
     """Assign the selected faces to a part; without one to a new part with this name."""
     settings = context.scene.wks_segment
+    labels = segment_list.active_labels(settings)
     # Objects that are not in Edit Mode can have selected faces as well, which are not visible.
     objects, warnings = [obj for obj in segment_list.labeled(settings) if obj.mode == "EDIT"], list[str]()
     with segment_list.leaving_edit_mode(context):
@@ -84,15 +85,15 @@ def _assign(operator: bpy.types.Operator, context: bpy.types.Context, part: int 
         count = sum(int(faces.sum()) for faces in selected.values())
         if count:
             if part is None:
-                part = segment_list.make_part(settings, name)
+                part = segment_list.make_part(settings, labels, name)
             for mesh, faces in selected.items():
                 keep_by_hand(mesh, np.where(faces, part, by_hand(mesh)))
-            warnings = segment_list.rewrite_all(settings, objects)
+            warnings = segment_list.rewrite_all(settings, labels, objects)
             segment_list.activate(settings, part)
     if not count:
         _report.tell(operator, {"WARNING"}, "Select some faces of an object that has segments first")
         return {"CANCELLED"}
-    segment = settings.style().name_of(part)
+    segment = settings.style(labels).name_of(part)
     _report.tell(operator, {"INFO"}, Message("Assigned {count} faces to {segment}", count=count, segment=segment))
     _report.tell_warnings(operator, warnings)
     return {"FINISHED"}

@@ -23,7 +23,7 @@ class WKS_SEGMENT_OT_bake(BaseOperator, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
         size = settings.bake_size
-        options = BakeOptions(size, settings.bake_margin, settings.bake_unwrap, settings.style())
+        options = BakeOptions(size, settings.bake_margin, settings.bake_unwrap)
         images: list[str] = []
         warnings: list[str] = []
         with _report.cursor_progress(context) as progress:

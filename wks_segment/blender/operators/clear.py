@@ -7,22 +7,33 @@ import bpy
 from ...core.message import Message
 from ..errors import UserError
 from ..outputs.labels import clear_labels
+from ..outputs.overrides import faces_by_hand
 from ..outputs.part_attributes import has_labels
 from ..outputs.separate import original_of, unite
 from ..scene.characters import check_not_edited, quoted, selected_meshes
+from ..ui.messages import in_panel
 from ..workflow import segment_list
 from . import _needs, _report
 from ._base import BaseOperator
 
 
 class WKS_SEGMENT_OT_clear(BaseOperator, bpy.types.Operator):
-    """Remove everything that was written to the selected objects, and restore their own materials"""
+    """Remove everything that was written to the selected objects; asks first if faces were assigned by hand"""
 
     bl_idname = "wks_segment.clear"
     bl_label = "Clear"
     bl_options = {"REGISTER", "UNDO"}
 
     needs = (_needs.object_mode, _needs.labeled_mesh)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        count = sum(faces_by_hand(mesh) for mesh in {obj.data for obj in selected_meshes(context)})
+        if not count or not _report.has_window(context):
+            return self.execute(context)
+        message = Message("{count} faces that were assigned by hand are cleared as well", count=count)
+        return context.window_manager.invoke_confirm(
+            self, event, title=in_panel("Clear"), message=in_panel(message), confirm_text=in_panel("Clear")
+        )
 
     def run(self, context: bpy.types.Context) -> set[str]:
         selected = selected_meshes(context)
@@ -42,7 +53,6 @@ class WKS_SEGMENT_OT_clear(BaseOperator, bpy.types.Operator):
         remaining = originals | {obj for obj in context.scene.objects if obj.name in names}
         meshes = {obj.data for obj in remaining if obj.data.library is None}
         n_cleared = sum(clear_labels(mesh, warnings) for mesh in meshes)
-        context.scene.wks_segment.applied = ""
         segment_list.fill(context.scene.wks_segment)
         if not any(obj.type == "MESH" and has_labels(obj.data) for obj in context.scene.objects):
             _report.hide_colors(context)

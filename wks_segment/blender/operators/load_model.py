@@ -29,11 +29,11 @@ class WKS_SEGMENT_OT_load_model(BaseOperator, bpy.types.Operator, ImportHelper):
     def run(self, context: bpy.types.Context) -> set[str]:
         path = Path(bpy.path.abspath(self.filepath))
         try:
-            model = PoseSegmentation.load(path)
+            model, summary = PoseSegmentation.load(path), model_library.summary_in(path)
         except (ModelFileError, OSError) as error:
             raise UserError("{file} was not loaded: {reason}", file=path.name, reason=message_of(error)) from error
         count = model.n_segments_
-        summary = [Message("From {names}", names=path.name), Message("{count} segments", count=count)]
+        summary = summary or [Message("From {names}", names=path.name), Message("{count} segments", count=count)]
         model_library.add_model(context.scene.wks_segment, model, path.stem, summary)
         _report.tell(
             self, {"INFO"}, Message("Loaded a model of {count} segments from {file}", count=count, file=path.name)

@@ -44,10 +44,11 @@ class WKS_SEGMENT_OT_merge_segments(BaseOperator, bpy.types.Operator):
         part, into = segment_list.active_part(settings), self.into
         if part is None or into == part or into not in [item.number for item in settings.segments]:
             raise UserError("Choose another segment to merge the active one into")
-        notes, style = settings.notes(), settings.style()
+        labels = segment_list.active_labels(settings)
+        notes, style = settings.notes(labels), settings.style(labels)
         merged_into = {other: into if old == part else old for other, old in notes.joined.items()}
-        settings.keep_notes(replace(notes, joined=merged_into | {part: into}))
-        warnings = segment_list.rewrite_all(settings)
+        settings.keep_notes(replace(notes, joined=merged_into | {part: into}), labels)
+        warnings = segment_list.rewrite_all(settings, labels)
         segment_list.activate(settings, into)
         _report.tell(
             self, {"INFO"},

@@ -26,6 +26,7 @@ class WKS_SEGMENT_OT_name_segment(BaseOperator, bpy.types.Operator):
         settings = context.scene.wks_segment
         part = segment_list.active_part(settings)
         if part is not None:
-            segment_list.rename(settings, part, self.name)
-            _report.tell(self, {"INFO"}, Message("Named {segment}", segment=settings.style().name_of(part)))
+            labels = segment_list.active_labels(settings)
+            segment_list.rename(settings, labels, part, self.name)
+            _report.tell(self, {"INFO"}, Message("Named {segment}", segment=settings.style(labels).name_of(part)))
         return {"FINISHED"}

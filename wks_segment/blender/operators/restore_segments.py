@@ -10,6 +10,7 @@ import numpy as np
 from ...core.message import Message
 from ..outputs.overrides import keep_by_hand
 from ..workflow import segment_list
+from ..workflow.followed_settings import follow_active
 from . import _needs, _report
 from ._base import BaseOperator
 
@@ -20,7 +21,8 @@ AS_THE_MODEL = "The segments are as in the model"
 def _edited_segments(context: bpy.types.Context) -> Message | None:
     """A message if the user has not merged, split or made a segment."""
     settings = context.scene.wks_segment
-    return None if settings.faces_by_hand or settings.notes().joined else Message(AS_THE_MODEL)
+    merged = settings.notes(segment_list.active_labels(settings)).joined
+    return None if settings.faces_by_hand or merged else Message(AS_THE_MODEL)
 
 
 class WKS_SEGMENT_OT_restore_segments(BaseOperator, bpy.types.Operator):
@@ -34,17 +36,18 @@ class WKS_SEGMENT_OT_restore_segments(BaseOperator, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
+        labels = segment_list.active_labels(settings)
         for mesh in segment_list.meshes_of(segment_list.labeled(settings)):
             keep_by_hand(mesh, np.full(len(mesh.polygons), -1))
-        settings.keep_notes(replace(settings.notes(), joined={}))
-        warnings = segment_list.rewrite_all(settings)
+        settings.keep_notes(replace(settings.notes(labels), joined={}), labels)
+        warnings = segment_list.rewrite_all(settings, labels)
         _report.tell(self, {"INFO"}, AS_THE_MODEL)
         _report.tell_warnings(self, warnings)
         return {"FINISHED"}
 
 
 class WKS_SEGMENT_OT_refresh_segments(BaseOperator, bpy.types.Operator):
-    """List the segments of the selected objects, or of all if none is selected"""
+    """Show the settings and the segments of the active object"""
 
     bl_idname = "wks_segment.refresh_segments"
     bl_label = "Refresh List of Segments"
@@ -53,5 +56,5 @@ class WKS_SEGMENT_OT_refresh_segments(BaseOperator, bpy.types.Operator):
     needs = (_needs.object_mode,)
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        segment_list.fill(context.scene.wks_segment)
+        follow_active(context.scene.wks_segment)
         return {"FINISHED"}

@@ -6,8 +6,10 @@ import bpy
 
 from ...core.message import Message
 from ..errors import UserError
+from ..outputs.origin import origin_of
 from ..outputs.part_attributes import labels_on
 from ..outputs.separate import original_of, separate
+from ..props.label_set import style_of
 from ..scene.characters import group, selected_meshes
 from . import _needs, _report
 from ._base import BaseOperator
@@ -23,7 +25,6 @@ class WKS_SEGMENT_OT_separate(BaseOperator, bpy.types.Operator):
     needs = (_needs.no_job, _needs.object_mode, _needs.labeled_mesh)
 
     def run(self, context: bpy.types.Context) -> set[str]:
-        style = context.scene.wks_segment.style()
         separated = []
         for character in group(selected_meshes(context)):
             for obj in character.objects:
@@ -31,6 +32,6 @@ class WKS_SEGMENT_OT_separate(BaseOperator, bpy.types.Operator):
                     raise UserError('"{object}" is separated already: Clear it first', object=obj.name)
                 labels = labels_on(obj.data)
                 if labels is not None:
-                    separated += separate(context, obj, labels, style)
+                    separated += separate(context, obj, labels, style_of(origin_of(obj.data).labels))
         _report.tell(self, {"INFO"}, Message("Separated into {count} objects", count=len(separated)))
         return {"FINISHED"}

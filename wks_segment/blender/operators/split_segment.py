@@ -29,10 +29,10 @@ class WKS_SEGMENT_OT_split_segment(BaseOperator, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.wks_segment
         part = segment_list.active_part(settings)
-        objects = segment_list.labeled(settings)
+        labels, objects = segment_list.active_labels(settings), segment_list.labeled(settings)
         if part is None:
             return {"CANCELLED"}
-        name = settings.style().name_of(part)
+        name = settings.style(labels).name_of(part)
         regions_by_character = regions_of(group(objects), part, settings.min_share / 100)
         count = 1 + max((int(regions.max(initial=-1)) for regions in regions_by_character.values()), default=-1)
         if count > MAX_COLORS:
@@ -47,12 +47,13 @@ class WKS_SEGMENT_OT_split_segment(BaseOperator, bpy.types.Operator):
             return {"CANCELLED"}
         base, side = part_ids.without_side(name), part // part_ids.SIDE_STEP
         # The first region keeps the part's own number.
-        part_of_region = np.array([-1, *(segment_list.make_part(settings, base, side) for _ in range(count - 1))])
+        made = [segment_list.make_part(settings, labels, base, side) for _ in range(count - 1)]
+        part_of_region = np.array([-1, *made])
         for character, regions in regions_by_character.items():
             for obj, polygons in polygon_ranges(character):
                 new_parts = part_of_region[np.maximum(regions[polygons], 0)]
                 keep_by_hand(obj.data, np.where(new_parts < 0, by_hand(obj.data), new_parts))
-        warnings = segment_list.rewrite_all(settings, objects)
+        warnings = segment_list.rewrite_all(settings, labels, objects)
         _report.tell(self, {"INFO"}, Message("Split {segment} into {count} parts", segment=name, count=count))
         _report.tell_warnings(self, warnings)
         return {"FINISHED"}

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 
 from ...core.message import Message
+from ..outputs.origin import origin_of
 from ..outputs.part_attributes import labels_on
 from ..outputs.transfer import transfer_labels
 from ..scene import poses as reader
@@ -52,7 +55,8 @@ class WKS_SEGMENT_OT_transfer(BaseOperator, bpy.types.Operator):
                 (character,) = group([obj])
                 (target,) = reader.read_objects(context, [character])
                 labels[character] = pipeline.filled(transfer_labels(source, target), Body.of(character))
-        pipeline.write_outputs(settings, labels, LabelRequest.of(settings, labels), report)
+        origin = replace(origin_of(active.data), job="", transferred=True)
+        pipeline.write_outputs(settings, labels, LabelRequest.of(settings, labels), report, origin=origin)
         if settings.write_colors:
             _report.show_colors(context)
         _report.tell_warnings(self, report.warnings)

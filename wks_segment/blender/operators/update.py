@@ -6,24 +6,39 @@ import bpy
 
 from ...core.message import Message
 from ..workflow.live_session import NOTHING_TO_UPDATE, session_of
+from ..workflow.update_job import UpdateJob
 from . import _needs, _report
-from ._base import BaseOperator
+from ._base import JobOperator
 
 
-def _kept_job(context: bpy.types.Context) -> Message | None:
-    """A message if the labels in this scene are not from the job that the session keeps."""
-    return None if session_of(context).holds(context.scene) else Message(NOTHING_TO_UPDATE)
+def _labels_of_a_model(context: bpy.types.Context) -> Message | None:
+    """A message if no labels that follow the settings are selected."""
+    return None if session_of(context).can_update(context.scene) else Message(NOTHING_TO_UPDATE)
 
 
-class WKS_SEGMENT_OT_update(BaseOperator, bpy.types.Operator):
-    """Update the segments that were learned or applied last to the current settings"""
+class WKS_SEGMENT_OT_update(JobOperator[UpdateJob], bpy.types.Operator):
+    """Update the segments of the selected objects to the current settings, each by its own model"""
 
     bl_idname = "wks_segment.update"
     bl_label = "Update Segments"
     bl_options = {"UNDO"}
 
-    needs = (_kept_job, _needs.no_job, _needs.object_mode)
+    needs = (_labels_of_a_model, _needs.no_job, _needs.object_mode)
 
-    def run(self, context: bpy.types.Context) -> set[str]:
-        job = session_of(context).update(context.scene)
-        return _report.finish(self, Message("Updated"), job.report)
+    def read(self, context: bpy.types.Context) -> UpdateJob:
+        """Read what was not kept of the selected objects."""
+        return session_of(context).updated(context)
+
+    def write_result(self, context: bpy.types.Context) -> set[str]:
+        """Write the labels and report them."""
+        return write_update(self, context, self.job, Message("Updated"))
+
+
+def write_update(operator: bpy.types.Operator, context: bpy.types.Context, update: UpdateJob, verb: str) -> set[str]:
+    """Write updated labels and report them."""
+    session = session_of(context)
+    session.write_all(update)
+    session.follow(context.scene)
+    for job in update.jobs:
+        _report.finish(operator, verb, job.report)
+    return {"FINISHED"}

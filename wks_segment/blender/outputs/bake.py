@@ -13,11 +13,12 @@ from ...core.mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ...core.message import Message
 from ...core.progress import Progress
 from ..errors import UserError
-from ..parts.part_style import Style
+from ..props.label_set import style_of
 from ..scene.attributes import new_attribute, read_attribute, read_floats, read_ints, read_pixels, write_ints
 from ..scene.characters import Character
 from .id_map import IMAGE_NAME, NO_PART, with_margin, write_id_map
 from .ledger import Ledger
+from .origin import origin_of
 from .part_attributes import labels_on
 from .unwrapping import project
 from .uv_maps import write_uv_map
@@ -44,14 +45,11 @@ class BakeOptions:
         Size of the image and width of the margin around its islands, in pixels.
     unwrap : bool
         Whether an object without a usable UV map gets one of ours, by Smart UV Project.
-    style : Style
-        Colors of parts.
     """
 
     size: int
     margin: int
     unwrap: bool
-    style: Style
 
 
 @dataclass(frozen=True)
@@ -67,6 +65,8 @@ class _Layer:
     """(size, size) parts of some objects in an image, from the bottom row up."""
 
     objects: list[bpy.types.Object]
+    labels: str
+    """Key of the label set of the parts."""
     part_map: IntArray = field(repr=False)
 
     @property
@@ -100,8 +100,9 @@ def bake_id_maps(
         progress(i / len(objects), Message('ID map of "{name}"', name=obj.name))
         if not has_uvs(obj.data):
             write_uv_map(obj.data, project(context, obj.data))
-        layer = _Layer([obj], bake_parts(context, obj, options.size, warnings))
-        shared = next((other for other in layers if _are_disjoint(layer.covered, other.covered)), None)
+        layer = _Layer([obj], origin_of(obj.data).labels, bake_parts(context, obj, options.size, warnings))
+        alike = (other for other in layers if other.labels == layer.labels)
+        shared = next((other for other in alike if _are_disjoint(layer.covered, other.covered)), None)
         if shared is None:
             layers.append(layer)
         else:
@@ -111,7 +112,8 @@ def bake_id_maps(
     for layer in layers:
         name = IMAGE_NAME.format(character.name if len(layers) == 1 else layer.objects[0].name)
         meshes = list(dict.fromkeys(obj.data for obj in layer.objects))
-        image = write_id_map(meshes, name, with_margin(layer.part_map, options.margin), options.style, warnings)
+        part_map = with_margin(layer.part_map, options.margin)
+        image = write_id_map(meshes, name, part_map, style_of(layer.labels), warnings)
         maps.append(IdMap(image, tuple(layer.objects)))
     return maps
 

@@ -9,11 +9,13 @@ import bpy
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
+from ...core.files.whole_file import incomplete, whole_file
 from ...core.mesh.triangle_mesh import IntArray
 from ...core.message import Message
-from ..errors import UserError
 from ..parts.part_style import Style
 from ..scene.attributes import OUR_HIDDEN_ATTRIBUTE, read_face_ints, read_pixels, write_pixels
+from ..scene.complete_files import check_complete
+from ..scene.file_formats import not_written
 from ..scene.fingerprint import fingerprint, users_of
 from .ledger import MARK, Ledger
 from .own_property import OwnProperty
@@ -91,16 +93,18 @@ def write_id_map(
 
 
 def save_image(image: bpy.types.Image, path: Path) -> None:
-    """Write an image to a .png file; UserError if it cannot be written."""
+    """Write an image to a .png file, which appears whole; UserError if it cannot be written."""
     image.file_format = "PNG"
     # Older versions of Blender always save a copy, and have no parameter for it.
     as_copy = {"save_copy": True} if "save_copy" in image.bl_rna.functions["save"].parameters else {}
     try:
-        image.save(filepath=str(path.resolve()), **as_copy)
-    except RuntimeError as error:
-        raise UserError("{path}: cannot write the image: {reason}", path=path, reason=str(error).strip()) from error
-    if not path.is_file():
-        raise UserError("{path}: cannot write the image", path=path)
+        with whole_file(path, check_complete) as unfinished:
+            try:
+                image.save(filepath=str(unfinished), **as_copy)
+            except RuntimeError as error:
+                raise incomplete(unfinished, str(error).strip()) from error
+    except OSError as error:
+        raise not_written(path, error) from error
 
 
 def images_of_joined(mesh: bpy.types.Mesh) -> list[str]:

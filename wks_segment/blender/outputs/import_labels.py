@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,15 +43,19 @@ class _Membership:
     ours: Mapping[Any, int]
 
 
-def corrected_parts(character: Character, source: str) -> dict[Hashable, int]:
+def corrected_parts(
+    character: Character, source: str, make_part: Callable[[], int] | None = None
+) -> dict[Hashable, int]:
     """Part of each face set (its number), material or vertex group (its name) of a character.
 
-    What we wrote keeps its part; what an artist added gets the lowest numbers that no part has, in order.
+    What we wrote keeps its part.
 
     Parameters
     ----------
     source : str
         One of `LABEL_SOURCES`.
+    make_part : callable, optional
+        Gives the number of a new part, for what an artist added; the lowest that no part has if not given.
 
     Raises
     ------
@@ -65,7 +69,7 @@ def corrected_parts(character: Character, source: str) -> dict[Hashable, int]:
     for membership in memberships:
         for i in np.unique(membership.index).tolist():
             if membership.keys[i] not in parts:
-                part = next(free, None)
+                part = next(free, None) if make_part is None else make_part()
                 if part is None:
                     raise UserError(
                         '"{name}" has too many of these for segments, more than {count}',

@@ -9,13 +9,15 @@ import bpy
 import numpy as np
 
 from ..parts.part_style import Style
+from ..props.label_set import known_sets, style_of
 from ..scene.attributes import OUR_HIDDEN_ATTRIBUTE, read_face_ints
 from ..scene.vertex_group_access import group_owner
 from .color_attribute import PART_COLORS
 from .face_sets import OWN_FACE_SETS
 from .id_map import JOINED, images_of_joined
 from .ledger import MARK, Ledger
-from .overrides import BY_HAND, MODEL_LABELS
+from .origin import origin_of
+from .overrides import BY_HAND, MODEL_LABELS, OTHER_SETS, attributes_of_sets
 from .own_materials import KEYS, OWN_KEYS, OWN_MATERIALS
 from .part_attributes import FACE_ATTRIBUTE, VERTEX_ATTRIBUTE, labels_on
 from .part_materials import without_number
@@ -49,6 +51,10 @@ def adopt(mesh: bpy.types.Mesh) -> None:
         is_like_ours = attribute is not None and (attribute.data_type, attribute.domain) == (data_type, domain)
         if key not in ledger and is_like_ours:
             ledger[key] = name
+    sets = dict(ledger.get(OTHER_SETS, {}))
+    more = [name for name in attributes_of_sets(mesh) if name not in sets.values()]
+    if more:  # of which sets is not known
+        ledger[OTHER_SETS] = sets | {name: name for name in more}
     images = images_of_joined(mesh)
     if images:
         ledger[JOINED] = images
@@ -59,7 +65,7 @@ def adopt(mesh: bpy.types.Mesh) -> None:
 
 def _adopt_groups(mesh: bpy.types.Mesh, ledger: Ledger, parts: list[int]) -> None:
     """Enter the vertex groups that have the name of a part."""
-    styles = [Style(), *(scene.wks_segment.style() for scene in bpy.data.scenes)]
+    styles = [Style(), *map(style_of, [*known_sets(), origin_of(mesh).labels])]
     part_of_name = {GROUP_NAME.format(style.name_of(part)): part for style in styles for part in parts}
     names, numbers = list(ledger.get("vertex_groups", [])), list(ledger.get("group_parts", []))
     with group_owner(mesh) as owner:

@@ -24,6 +24,7 @@ from .joined_meshes import adopt
 from .ledger import Ledger
 from .materials import Materials, template_on
 from .options import DEFAULT_OUTPUTS, OutputOptions
+from .origin import LABEL_ORIGIN
 from .output import LastingOutput, Output, PartsOfMesh
 from .overrides import ByHand, ModelLabels, by_hand, merge_parts, model_labels
 from .part_attributes import PartAttributes, has_labels, labels_on
@@ -85,7 +86,7 @@ def write_labels(
     ledger = Ledger(mesh)
     for output in reversed(OUTPUTS):
         output.take_back(mesh, ledger)
-    ledger.begin([key for lasting in LASTING_OUTPUTS for key in lasting.keys])
+    ledger.begin([LABEL_ORIGIN, *(key for lasting in LASTING_OUTPUTS for key in lasting.keys)])
     parts = PartsOfMesh(final, labels, weights, shown, options)
     for output in OUTPUTS:
         output.write(mesh, parts, ledger)
@@ -96,8 +97,11 @@ def write_labels(
     return final
 
 
-def rewrite_labels(mesh: bpy.types.Mesh, style: Style, merged_into: Mapping[int, int], warnings: list[str]) -> None:
-    """Write the labels of a mesh again, with all outputs that it has, after a person's changes."""
+def rewrite_labels(
+    mesh: bpy.types.Mesh, style: Style, merged_into: Mapping[int, int], warnings: list[str],
+    chosen: OutputOptions | None = None,
+) -> None:  # fmt: skip
+    """Write the labels of a mesh again after a person's changes, with all outputs that it has, or with chosen ones."""
     check_may_change(mesh)
     adopt(mesh)
     labels, before = model_labels(mesh), labels_on(mesh)
@@ -121,6 +125,9 @@ def rewrite_labels(mesh: bpy.types.Mesh, style: Style, merged_into: Mapping[int,
         seams="seams" in ledger,
         style=style,
     )
+    if chosen is not None:
+        weights = weights if chosen.vertex_groups == "soft" else None
+        options = chosen
     write_labels(mesh, labels, options, merged_into, weights, warnings)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from ..parts.palette import linear
 from ..parts.part_ids import default_name
 from ..parts.part_style import Style
+from ..props.label_set import style_of
 from ..scene.fingerprint import fingerprint, is_made_as, made_as, users_of
 from .ledger import has_ledger
 from .own_property import OwnProperty
@@ -18,6 +19,8 @@ from .restore_point import is_removed, on_failure
 
 PART_PROPERTY = "wks_segment_component"
 """Custom property of our materials: the part that they show."""
+LABELS_PROPERTY = "wks_segment_labels"
+"""Custom property of our materials: key of the label set that the part belongs to."""
 TEMPLATE_PROPERTY = "wks_segment_template"
 """Custom property of our materials that are copies: the name of the material that they were copied from."""
 OTHER_DEFAULTS = ("location", "location_absolute", "use_backface_culling_lightprobe_volume")
@@ -35,11 +38,16 @@ def part_of(material: bpy.types.Material | None) -> int | None:
 
 
 def material_of_part(part: int, style: Style, template: bpy.types.Material | None) -> bpy.types.Material:
-    """The material of a part, the same one on all meshes. One that the artist has changed is taken as it is."""
+    """The material of a part, the same one on all meshes of its label set.
+
+    One that the artist has changed is taken with these changes.
+    """
     source = "" if template is None else template.name
     for material in bpy.data.materials:
         is_ours = part_of(material) == part and material.library is None and not is_removed(material)
-        if is_ours and material.get(TEMPLATE_PROPERTY, "") == source:
+        is_of_set = is_ours and material.get(LABELS_PROPERTY, "") == style.labels
+        if is_of_set and material.get(TEMPLATE_PROPERTY, "") == source:
+            restyle_material(material, style, name=True, color=True)
             return material
     return _new_material(part, style, template)
 
@@ -137,6 +145,8 @@ def _new_material(part: int, style: Style, template: bpy.types.Material | None) 
         if material.asset_data is not None:
             material.asset_clear()
     material[PART_PROPERTY] = part
+    if style.labels:
+        material[LABELS_PROPERTY] = style.labels
     color = _color_of(part, style)
     _paint(material, color)
     _enter(material, color)
@@ -165,7 +175,7 @@ def _made_of(material: bpy.types.Material) -> dict[str, Any]:
     if made is not None:
         return dict(made.to_dict())
     assert part is not None
-    names = [default_name(part), *(scene.wks_segment.style().name_of(part) for scene in bpy.data.scenes)]
+    names = [default_name(part), style_of(material.get(LABELS_PROPERTY, "")).name_of(part)]
     name = next((name for name in names if name == without_number(material.name)), names[0])
     return {"name": name, "color": tuple(material.diffuse_color)}
 

@@ -14,9 +14,11 @@ from mathutils import Matrix
 from ...core.mesh.triangle_mesh import BoolArray, IntArray
 from ..parts import part_ids
 from ..parts.part_style import Style
+from ..props.label_set import style_of
 from ..scene.fingerprint import Label, fingerprint, is_made_as, label_of, made_as, users_of
 from ..scene.simulations import check_may_change
 from .ledger import Ledger
+from .origin import origin_of
 from .own_property import OwnProperty
 from .part_attributes import labels_on
 from .part_materials import without_number
@@ -105,8 +107,8 @@ def is_as_made(obj: bpy.types.Object) -> bool:
     again = _make(original, of_original, int(labels[0]), Style())
     again.hide_render = _ORIGINAL.of(original)["render"] if _ORIGINAL.of(original) is not None else again.hide_render
     try:
-        names = {scene.wks_segment.style().name_of(int(labels[0])) for scene in bpy.data.scenes}
-        is_named = without_number(obj.name) in names and without_number(obj.data.name) in names
+        name = style_of(origin_of(original.data).labels).name_of(int(labels[0]))
+        is_named = without_number(obj.name) == without_number(obj.data.name) == name
         return (
             is_named and _users(obj) == _users(again) and fingerprint(obj, obj.data) == fingerprint(again, again.data)
         )

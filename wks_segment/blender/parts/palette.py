@@ -166,10 +166,10 @@ def colors_of(parts: IntArray, name: str = DEFAULT_PALETTE) -> FloatArray:
     return sided_palette(name)[sides_of(parts), segments_of(parts) % MAX_COLORS]
 
 
-def most_different(used: FloatArray) -> FloatArray:
-    """(3,) sRGB color of the default palette that looks most different from the (k, 3) used colors."""
-    apart = np.linalg.norm(oklab(palette())[:, None] - oklab(used), axis=2)
-    return np.asarray(palette()[int(apart.min(axis=1).argmax())])
+def most_different(candidates: FloatArray, used: FloatArray) -> int:
+    """Index of the one of (n, 3) sRGB colors that looks most different from the (k, 3) used colors."""
+    apart = np.linalg.norm(oklab(candidates)[:, None] - oklab(used), axis=2)
+    return int(apart.min(axis=1, initial=np.inf).argmax())
 
 
 def linear(srgb: FloatArray) -> FloatArray:

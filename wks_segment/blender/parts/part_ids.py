@@ -74,6 +74,17 @@ def siblings_of(part: int) -> list[int]:
     return [part] if side == 0 or segment >= FIRST_MADE else [segment + SIDE_STEP, segment + 2 * SIDE_STEP]
 
 
+def model_of(labels: str) -> str:
+    """Identity of the model of a label set, given its key; empty if no model gave the labels."""
+    return labels.rpartition("/")[0]
+
+
+def number_of(labels: str) -> int:
+    """Number of segments of a label set, given its key; 0 if it is not known."""
+    number = labels.rpartition("/")[2]
+    return int(number) if number.isdecimal() else 0
+
+
 def free_part(taken: Collection[int], side: int = 0) -> int:
     """Number for a new part that a person makes, of a segment that no taken part has."""
     segments = {part % SIDE_STEP for part in taken}

@@ -24,10 +24,16 @@ class PropertyListener(Protocol):
     def model_renamed(self, settings: Any, row: Any) -> None:
         """A row of the list of models has another name."""
 
-    def rename_part(self, settings: Any, part: int, name: str) -> None:
+    def outputs_changed(self, settings: Any) -> None:
+        """Something else is to be written of segments."""
+
+    def palette_chosen(self, settings: Any) -> None:
+        """The user has chosen another palette."""
+
+    def rename_part(self, settings: Any, labels: str, part: int, name: str) -> None:
         """The user has typed another name for a part."""
 
-    def recolor_part(self, settings: Any, part: int, color: tuple[float, float, float]) -> None:
+    def recolor_part(self, settings: Any, labels: str, part: int, color: tuple[float, float, float]) -> None:
         """The user has chosen another color for a part."""
 
 
@@ -72,8 +78,14 @@ class _Deaf:
     def model_renamed(self, settings: Any, row: Any) -> None:
         """Nothing."""
 
-    def rename_part(self, settings: Any, part: int, name: str) -> None:
+    def outputs_changed(self, settings: Any) -> None:
         """Nothing."""
 
-    def recolor_part(self, settings: Any, part: int, color: tuple[float, float, float]) -> None:
+    def palette_chosen(self, settings: Any) -> None:
+        """Nothing."""
+
+    def rename_part(self, settings: Any, labels: str, part: int, name: str) -> None:
+        """Nothing."""
+
+    def recolor_part(self, settings: Any, labels: str, part: int, color: tuple[float, float, float]) -> None:
         """Nothing."""

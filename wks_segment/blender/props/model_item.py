@@ -17,10 +17,11 @@ def _renamed(row: Any, context: bpy.types.Context) -> None:
 class WKSModelItem(bpy.types.PropertyGroup):
     """A learned model of this scene.
 
-    The text of the model in use is kept in the settings, where its names and colors are read and written; its row holds
-    none.
+    The text of the model in use is kept in the settings; its row holds none.
     """
 
+    uid: StringProperty(options={"HIDDEN"}, description="Identity of what was learned, as meshes know it")
+    learned_from: StringProperty(options={"HIDDEN"}, description="Names of the objects it was learned from, as JSON")
     name: StringProperty(name="Name", description="Name of the model, unique in the list", update=_renamed)
     n_segments: IntProperty(name="Segments", description="Number of segments of the model", min=0)
     date: StringProperty(name="Date", description="Day on which the model was learned or imported")
@@ -29,7 +30,13 @@ class WKSModelItem(bpy.types.PropertyGroup):
     summary_messages: StringProperty(
         options={"HIDDEN"}, description="The same lines as JSON with templates and values, for other languages"
     )
-    notes: StringProperty(options={"HIDDEN"}, description="Names and colors of the model's segments as JSON")
+    notes: StringProperty(
+        options={"HIDDEN"}, description="Notes of a file of version 0.1.0 on the model's segments, as JSON"
+    )
+
+    def labels(self) -> str:
+        """Key of the label set that the model gives: the same whatever other models there are."""
+        return f"{self.uid}/{self.n_segments}"
 
 
 class WKSRankItem(bpy.types.PropertyGroup):

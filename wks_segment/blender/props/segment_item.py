@@ -9,27 +9,28 @@ import numpy as np
 from bpy.props import BoolProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
 from .changes import listener
+from .label_set import style_of
 
 
 def _get_name(row: Any) -> str:
-    return row.id_data.wks_segment.style().name_of(row.number)
+    return style_of(row.labels).name_of(row.number)
 
 
 def _set_name(row: Any, name: str) -> None:
-    listener().rename_part(row.id_data.wks_segment, row.number, name)
+    listener().rename_part(row.id_data.wks_segment, row.labels, row.number, name)
 
 
 def _get_color(row: Any) -> list[float]:
-    return row.id_data.wks_segment.style().colors_of(np.array(row.number)).tolist()
+    return style_of(row.labels).colors_of(np.array(row.number)).tolist()
 
 
 def _set_color(row: Any, color: Any) -> None:
     red, green, blue = (float(channel) for channel in color)
-    listener().recolor_part(row.id_data.wks_segment, row.number, (red, green, blue))
+    listener().recolor_part(row.id_data.wks_segment, row.labels, row.number, (red, green, blue))
 
 
 class WKSSegmentItem(bpy.types.PropertyGroup):
-    """A part: a segment, or its left or right side. Name and color are kept in the settings' notes on parts."""
+    """A part: a segment, or its left or right side. Name and color are kept in the notes on its label set."""
 
     name: StringProperty(
         name="Name",
@@ -41,6 +42,7 @@ class WKSSegmentItem(bpy.types.PropertyGroup):
         name="Color", description="Color of the segment in all outputs",
         subtype="COLOR_GAMMA", size=3, min=0.0, max=1.0, get=_get_color, set=_set_color,
     )  # fmt: skip
+    labels: StringProperty(options={"HIDDEN"}, description="Key of the label set that the part belongs to")
     number: IntProperty(name="Number", description="Number that is written to faces", min=0, max=3000)
     share: FloatProperty(
         name="Share", description="Share of the surface area", min=0.0, max=100.0, precision=1, subtype="PERCENTAGE"

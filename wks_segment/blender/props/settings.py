@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any, Literal
 
 import bpy
@@ -16,11 +15,13 @@ from bpy.props import (
     StringProperty,
 )  # fmt: skip
 
-from ...core import PartNotes, PoseSegmentation
+from ...core import PoseSegmentation
 from ..errors import UserError
 from ..parts.palette import DEFAULT_PALETTE, MAX_COLORS, RECIPES
-from ..parts.part_style import Style
+from ..parts.part_style import SetNotes, Style
+from . import label_set
 from .changes import listener
+from .label_set import WKSLabelSet
 from .model_item import WKSModelItem, WKSRankItem
 from .segment_item import WKSSegmentItem
 
@@ -71,6 +72,16 @@ MODEL_PARAMETERS = (
 def _labels_outdated(settings: WKSSegmentSettings, context: bpy.types.Context) -> None:
     """Called by Blender when a setting that labels follow gets another value."""
     listener().labels_outdated(settings)
+
+
+def _outputs_changed(settings: WKSSegmentSettings, context: bpy.types.Context) -> None:
+    """Called by Blender when something else is to be written of segments."""
+    listener().outputs_changed(settings)
+
+
+def _palette_chosen(settings: WKSSegmentSettings, context: bpy.types.Context) -> None:
+    """Called by Blender when another palette is chosen."""
+    listener().palette_chosen(settings)
 
 
 def _model_chosen(settings: WKSSegmentSettings, context: bpy.types.Context) -> None:
@@ -130,6 +141,7 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         name="Live",
         description="Update the labels at once when a setting of the segments changes, unless that takes long",
         default=True,
+        update=_labels_outdated,
     )
     random_state: IntProperty(
         name="Seed",
@@ -235,33 +247,38 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
 
     write_colors: BoolProperty(
         name="Colors", description="Write a color attribute with one flat color for each face, and show it",
-        default=True,
+        default=True, update=_outputs_changed,
     )  # fmt: skip
     write_materials: BoolProperty(
         name="Materials",
         description="Add a material slot for each segment. Clear restores the object's own materials",
         default=False,
+        update=_outputs_changed,
     )
     material_template: PointerProperty(
         name="Template",
         description="Material to copy for each segment, with the color in its Base Color or in the RGB node before it",
         type=bpy.types.Material,
+        update=_outputs_changed,
     )
     write_face_sets: BoolProperty(
         name="Face Sets",
         description="Write a sculpting face set for each segment. Clear restores the object's own face sets",
         default=False,
+        update=_outputs_changed,
     )
     write_seams: BoolProperty(
         name="Seams",
         description="Mark the borders of segments as UV seams, in addition to the object's own seams",
         default=False,
+        update=_outputs_changed,
     )
     palette: EnumProperty(
         name="Palette",
         description="Colors of the segments",
         items=[(name, recipe.title, recipe.description) for name, recipe in RECIPES.items()],
         default=DEFAULT_PALETTE,
+        update=_palette_chosen,
     )
 
     vertex_groups: EnumProperty(
@@ -277,6 +294,7 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
             ("soft", "Soft", "Probability of the segment at each vertex; the weights of a vertex sum to 1"),
         ],
         default="none",
+        update=_outputs_changed,
     )
 
     bake_size: IntProperty(
@@ -303,9 +321,9 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
     used_model: IntProperty(
         options={"HIDDEN"}, description="Row of the model in use, -1 for none", default=-1, min=-1, max=9999
     )
-    replace_model: BoolProperty(
-        name="Replace",
-        description="Replace the active model in Learn and Segment instead of adding a new one",
+    keep_models: BoolProperty(
+        name="Keep Both",
+        description="Keep the model that was learned from a character before when it is learned again",
         default=False,
     )
     ranking: CollectionProperty(type=WKSRankItem, name="Ranking", description="Ranked models, best first")
@@ -321,20 +339,23 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         options={"HIDDEN"}, description="The same lines as JSON with templates and values, for other languages"
     )
 
-    applied: StringProperty(
-        options={"HIDDEN"}, description="Job and settings that the labels in this scene are from, see `Session`"
+    label_sets: CollectionProperty(
+        type=WKSLabelSet, options={"HIDDEN"}, description="Names, colors and merges of the labels of each model"
+    )
+    shown: StringProperty(
+        options={"HIDDEN"}, description="Mesh whose settings the fields show and whose segments are listed"
     )
 
-    segments: CollectionProperty(
-        type=WKSSegmentItem, name="Segments", description="Segments of the selected objects, or else of all objects"
-    )
+    segments: CollectionProperty(type=WKSSegmentItem, name="Segments", description="Segments of the active object")
     active_segment: IntProperty(
         name="Active Segment", description="Segment that the buttons below apply to", min=0, max=3000
     )
     faces_by_hand: IntProperty(
         options={"HIDDEN"}, description="Number of faces whose segment was assigned by hand", min=0, max=999_999
     )
-    part_notes: StringProperty(options={"HIDDEN"}, description="Names, colors and merges of parts by the user, as JSON")
+    part_notes: StringProperty(
+        options={"HIDDEN"}, description="Notes of a file of version 0.1.0 on the parts of its model, as JSON"
+    )
 
     def number(self) -> int | Literal["auto"]:
         """The number of segments in the form that a model takes."""
@@ -352,18 +373,20 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
             parameters["n_segments"] = "auto"
         return PoseSegmentation(**parameters)
 
-    def notes(self) -> PartNotes:
-        """The user's names, colors and merges of parts; none if the text is damaged."""
-        try:
-            return PartNotes.of_json(json.loads(self.part_notes or "{}"))
-        except ValueError:
-            return PartNotes()
+    def labels(self) -> str:
+        """Key of the label set of the model in use; empty if there is none."""
+        index = self.used_model
+        return self.models[index].labels() if 0 <= index < len(self.models) else ""
 
-    def keep_notes(self, notes: PartNotes) -> None:
-        """Store the user's names, colors and merges of parts in the scene."""
-        fields = notes.as_json()
-        self.part_notes = json.dumps(fields) if fields else ""
+    def notes(self, labels: str | None = None) -> SetNotes:
+        """The user's names, colors and merges of the parts of a label set, by default that of the model in use."""
+        return label_set.notes_of(self.labels() if labels is None else labels)
 
-    def style(self) -> Style:
-        """Names and colors of parts as the user has them."""
-        return Style.of(self.notes(), self.palette)
+    def keep_notes(self, notes: SetNotes, labels: str | None = None) -> None:
+        """Store the user's names, colors and merges of the parts of a label set."""
+        label_set.keep_notes(self, self.labels() if labels is None else labels, notes)
+
+    def style(self, labels: str | None = None) -> Style:
+        """Names and colors of the parts of a label set as the user has them."""
+        labels = self.labels() if labels is None else labels
+        return Style.of(label_set.notes_of(labels), self.palette, labels)

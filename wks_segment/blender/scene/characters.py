@@ -234,6 +234,13 @@ def group(objects: Sequence[bpy.types.Object], together: bool = False) -> list[C
     return [Character(tuple(members)) for members in by_body.values()]
 
 
+def same_body(obj: bpy.types.Object, objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Those of some mesh objects that are one character with an object."""
+    among = {obj, *objects}
+    body = _body_of(obj, among)
+    return [other for other in mesh_objects(among) if other is obj or _body_of(other, among) == body]
+
+
 def check_not_edited(obj: bpy.types.Object) -> None:
     """UserError if an object is in Edit Mode, or another one with its mesh: Blender cannot write to the mesh then."""
     if obj.mode == "EDIT":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import struct
 from contextlib import suppress
 from graphlib import CycleError, TopologicalSorter
@@ -33,6 +34,11 @@ CHUNK_HEADER = struct.Struct("<4s4I")
 """Beginning of a binary glTF file: its name, version and size, and the size and kind of the first chunk."""
 POINTERS = {b"version https://git-lfs": ("Git LFS", "git lfs pull"), b"/annex/objects/": ("git-annex", "git annex get")}
 """How files begin that stand for a large file of a repository; what made them, and the command that gets the file."""
+
+
+def name_of(path: Path) -> str:
+    """Name of a file without its suffix, for data-blocks and texts in Blender, which holds UTF-8 only."""
+    return os.fsencode(path.stem).decode(errors="replace")
 
 
 def check_content(path: Path) -> None:

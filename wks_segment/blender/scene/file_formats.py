@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
+import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import bpy
 
-from ...core.message import Message
+from ...core.files.whole_file import incomplete, no_space, whole_file
+from ...core.message import Message, message_of
 from ..errors import UserError
 from ..streams import silent
+from .complete_files import check_complete, check_obj
 from .file_content import check_content
 from .off_files import import_off
 
@@ -153,19 +158,65 @@ def check_length(path: Path, most: int) -> None:
 
 
 def check_folder(path: Path) -> None:
-    """UserError unless a file can be written to a path: its folder exists, and its name is not too long."""
+    """UserError unless a file can be written to a path: into its folder, and with a name that is not too long."""
     check_length(path, WRITTEN_NAME)
-    if not path.resolve().parent.is_dir():
-        raise UserError("{path}: the folder {folder} does not exist", path=path, folder=path.resolve().parent)
+    folder = path.resolve().parent
+    if not folder.is_dir():
+        raise UserError("{path}: the folder {folder} does not exist", path=path, folder=folder)
+    if not os.access(folder, os.W_OK):
+        raise UserError(
+            "{path}: the folder {folder} is not writable: take another one, or ask whom it belongs to",
+            path=path, folder=folder,
+        )  # fmt: skip
     if path.is_dir():
         raise UserError("{path}: this is a folder, give the name of a file", path=path)
 
 
 def save_scene(path: Path) -> None:
-    """Write the scene to a file; UserError if it cannot be written."""
+    """Write the scene to a file, which appears whole; UserError if it cannot be written."""
+    suffix = path.suffix.lower()
     try:
-        EXPORTERS[path.suffix.lower()](str(path.resolve()))
-    except (RuntimeError, OSError) as error:
-        raise UserError("{path}: it could not be written: {reason}", path=path, reason=str(error).strip()) from error
-    if not path.is_file():
-        raise UserError("{path}: it could not be written", path=path)
+        if suffix == ".obj":
+            _save_obj(path)
+        else:
+            with whole_file(path, check_complete) as unfinished:
+                _export(unfinished)
+    except OSError as error:
+        raise not_written(path, error) from error
+
+
+def _export(path: Path) -> None:
+    try:
+        EXPORTERS[path.suffix.lower()](str(path))
+    except RuntimeError as error:
+        if path.suffix.lower() == ".blend" and not path.exists() and _is_larger_than_space(path.parent):
+            raise no_space(path) from error
+        raise incomplete(path, _reason(str(error))) from error
+
+
+def _is_larger_than_space(folder: Path) -> bool:
+    """Whether the scene does not fit on the disk of a folder.
+
+    Blender before 5.0 removes the piece that it has written to a full disk, and says that the file does not exist.
+    """
+    with tempfile.TemporaryDirectory() as elsewhere, suppress(RuntimeError):
+        copy = Path(elsewhere) / "scene.blend"
+        EXPORTERS[".blend"](str(copy))
+        return copy.stat().st_size > shutil.disk_usage(folder).free
+    return False
+
+
+def _save_obj(path: Path) -> None:
+    """Write the scene to an .obj file, and its materials to an .mtl file beside it."""
+    objects = bpy.context.evaluated_depsgraph_get().objects
+    n_faces = sum(len(obj.data.polygons) for obj in objects if obj.type == "MESH")
+    with whole_file(path, lambda written: check_obj(written, n_faces), beside=[".mtl"]) as unfinished:
+        _export(unfinished)
+        # It speaks of its materials by the name that their file has for now.
+        library, final = (b"mtllib " + os.fsencode(name) + b".mtl\n" for name in (unfinished.stem, path.stem))
+        unfinished.write_bytes(unfinished.read_bytes().replace(library, final, 1))
+
+
+def not_written(path: Path, error: OSError) -> UserError:
+    """The error of a file that could not be written."""
+    return UserError("{path}: it could not be written: {reason}", path=path, reason=error.strerror or message_of(error))

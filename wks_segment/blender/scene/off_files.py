@@ -9,6 +9,7 @@ from pathlib import Path
 import bpy
 
 from ..errors import UserError
+from .file_content import name_of
 
 HEADER = re.compile(r"(ST)?C?N?OFF\b")
 """First word of a file in plain text, perhaps with coordinates of textures, colors or normals at each vertex."""
@@ -51,9 +52,9 @@ def import_off(path: str) -> None:
         raise UserError("{path}: the file ends before all vertices and faces: copy it again", path=file.name) from None
     except (ValueError, IndexError):
         raise UserError("{path}: line {line} is no line of an OFF file", path=file.name, line=number) from None
-    mesh = bpy.data.meshes.new(file.stem)
+    mesh = bpy.data.meshes.new(name_of(file))
     mesh.from_pydata(vertices, [], [corners for corners in faces if len(corners) > 2])
-    bpy.context.scene.collection.objects.link(bpy.data.objects.new(file.stem, mesh))
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new(name_of(file), mesh))
 
 
 def _lines(file: Path) -> Iterator[tuple[int, str]]:

@@ -25,8 +25,11 @@ class Told(Protocol):
     left_out: list[str]
 
 
-def read_training_poses(context: bpy.types.Context, settings: WKSSegmentSettings, told: Told) -> list[Pose]:
-    """Poses to learn from, read from the source that the settings name.
+def read_training_poses(
+    context: bpy.types.Context, settings: WKSSegmentSettings, told: Told,
+    objects: Sequence[bpy.types.Object] | None = None,
+) -> list[Pose]:  # fmt: skip
+    """Poses to learn from, of the selected meshes or of some objects, read from the source that the settings name.
 
     Raises
     ------
@@ -34,7 +37,7 @@ def read_training_poses(context: bpy.types.Context, settings: WKSSegmentSettings
         If there are no poses, or they cannot be used.
     """
     scene, source = context.scene, settings.source
-    selected = selected_meshes(context)
+    selected = selected_meshes(context) if objects is None else objects
     if source == "OBJECTS":
         characters = group(selected, together=settings.one_character)
         check_simulations(scene, characters, over_time=False)

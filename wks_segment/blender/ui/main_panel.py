@@ -11,7 +11,7 @@ import bpy
 from ...core.message import Message
 from ..props.presets import WKS_SEGMENT_PT_presets
 from ..workflow.background_job import BackgroundJob, job_holder
-from ..workflow.live_session import session_of
+from ..workflow.live_session import ASLEEP, session_of
 from .messages import in_panel
 
 SIDEBAR_LETTERS = 36
@@ -50,7 +50,7 @@ class _Sidebar:
         """Show whether labels follow the settings, and if not, why not and the button to update them."""
         settings, session = context.scene.wks_segment, session_of(context)
         self.settings(context, "live")
-        if not session.holds(context.scene):
+        if not session.can_update(context.scene):
             return
         row = self.layout.row()
         row.use_property_split, row.enabled = True, settings.live
@@ -61,14 +61,14 @@ class _Sidebar:
             row.operator("wks_segment.accept", icon="CHECKMARK")
             row.operator("wks_segment.discard", icon="X")
             return
-        slow = session.is_slow
+        slow, asleep = session.is_slow, not session.holds(context.scene)
         if settings.live and slow:
             text = Message("Labels take {seconds:.0f} seconds here, too long to update live", seconds=session.seconds)
             for line in wrapped(text):
                 column.label(text=line)
-        for line in wrapped(session.message):
+        for line in wrapped(session.message or (ASLEEP if settings.live and asleep else "")):
             column.label(text=line)
-        if not session.is_current(context.scene) and not session.is_scheduled:
+        if asleep or (not session.is_current(context.scene) and not session.is_scheduled):
             column.operator("wks_segment.update", icon="FILE_REFRESH")
 
     def job(self, context: bpy.types.Context) -> None:

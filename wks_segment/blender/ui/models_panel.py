@@ -68,7 +68,7 @@ class WKS_SEGMENT_PT_models(SubPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("wks_segment.load_model", text=in_panel("Import"), icon="IMPORT")
         row.operator("wks_segment.save_model", text=in_panel("Export"), icon="EXPORT")
-        layout.prop(settings, "replace_model")
+        layout.prop(settings, "keep_models")
         layout.operator("wks_segment.rank", icon="SORTSIZE")
         draw_ranking(layout, settings)
 

@@ -29,7 +29,7 @@ LIGHT_DIRECTION = np.array([0.3, -0.5, 0.8])
 
 
 def preview_triangles(
-    context: bpy.types.Context, labels: Mapping[Character, IntArray], style: Style = PLAIN
+    context: bpy.types.Context, labels: Mapping[Character, IntArray], styles: Mapping[Character, Style]
 ) -> tuple[FloatArray, FloatArray]:
     """(3 t, 3) corners of the characters' triangles in their current pose, a little above them, and (3 t, 4) colors.
 
@@ -38,8 +38,8 @@ def preview_triangles(
     context
     labels
         Part of each of a character's polygons.
-    style : Style, optional
-        Colors of parts.
+    styles
+        Colors of the parts of each character; the usual ones if it is missing.
     """
     corners, colors = [np.zeros((0, 3))], [np.zeros((0, 4))]
     for character, parts in labels.items():
@@ -57,6 +57,7 @@ def preview_triangles(
         # Raised along vertex normals: along face normals gaps would open between faces.
         corners.append((mesh.vertices + SURFACE_OFFSET * size * _unit(vertex_normals))[faces].reshape(-1, 3))
         face_colors = np.ones((len(labeled), 4))
+        style = styles.get(character, PLAIN)
         face_colors[:, :3] = style.colors_of(parts[polygon_of[labeled]]) * shade[:, None]
         colors.append(np.repeat(face_colors, 3, axis=0))
     return np.concatenate(corners), np.concatenate(colors)
@@ -76,9 +77,11 @@ class ViewportPreview:
         """Whether triangles are shown."""
         return self._handle is not None
 
-    def show(self, context: bpy.types.Context, labels: Mapping[Character, IntArray], style: Style) -> None:
+    def show(
+        self, context: bpy.types.Context, labels: Mapping[Character, IntArray], styles: Mapping[Character, Style]
+    ) -> None:
         """Show labels on the characters in their current pose; UserError if one cannot be read."""
-        self.corners, self.colors = preview_triangles(context, labels, style)
+        self.corners, self.colors = preview_triangles(context, labels, styles)
         self._batch = None
         if self._handle is None:
             self._handle = bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW")

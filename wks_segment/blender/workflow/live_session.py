@@ -1,11 +1,10 @@
-"""The live session: keeps the last job in memory, so that labels can follow changed settings within moments."""
+"""The live session: keeps jobs in memory, so that labels can follow changed settings within moments."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from itertools import count
 from typing import Any, Protocol
 
 import bpy
@@ -16,42 +15,48 @@ from ...core.mesh.triangle_mesh import IntArray
 from ...core.message import message_of
 from ...core.progress import Progress
 from ..errors import ChangedError, UserError
+from ..outputs.origin import Origin, origin_of
 from ..outputs.overrides import merge_parts
 from ..parts.part_style import Style
+from ..props.label_set import notes_of, style_of
 from ..props.preferences import preference
-from ..props.settings import LABEL_SETTINGS, WKSSegmentSettings
 from ..scene.characters import Character
+from . import model_library, segment_list
 from .background_job import job_holder, redraw_sidebars
+from .followed_settings import are_alike, show, values_of
 from .segmentation_job import SegmentationJob
+from .update_job import UpdateJob
 
 SESSION = "wks_segment_session"
 """Name of the session at the type of Blender's window manager."""
 QUIET_SECONDS = 0.1
 """Seconds without a change of settings before labels follow. With less they would follow while a slider is dragged;
 with more the user would notice the wait."""
-FOLLOWED_SETTINGS = (*LABEL_SETTINGS, "snap_to")
-"""Settings that labels follow."""
-NOTHING_TO_UPDATE = "Nothing was learned or applied since this file was opened, or it was undone"
+NOTHING_TO_UPDATE = "Nothing is selected that has segments of a model: use Learn and Segment or Apply to Selected"
+ASLEEP = "What Live needs was not kept: press Update Segments once, and it follows again"
 MAX_KEPT_BYTES = 1_000_000_000
-"""Most bytes of signatures in a kept job. With less, labels of large characters would not follow; with more, memory
+"""Most bytes of signatures in the kept jobs. With less, labels of large characters would not follow; with more, memory
 fills without being asked for."""
 
 
 class Preview(Protocol):
     """Shows labels in the viewport that are not written to a mesh."""
 
-    def show(self, context: bpy.types.Context, labels: Mapping[Character, IntArray], style: Style) -> None:
-        """Show labels; UserError if a character cannot be read."""
+    def show(
+        self, context: bpy.types.Context, labels: Mapping[Character, IntArray], styles: Mapping[Character, Style]
+    ) -> None:
+        """Show labels in the colors of their label sets; UserError if a character cannot be read."""
 
     def hide(self) -> None:
         """Stop showing labels."""
 
 
 class Session:
-    """Signatures of meshes and the last job, so that labels can follow the settings.
+    """Signatures of meshes and the jobs that labeled them, so that labels can follow the settings.
 
-    A scene stores from which job and which settings its labels are (`applied`), so that undo and redo restore that
-    together with the labels.
+    Each mesh keeps the name of its job and the settings of its labels, so undo and redo restore that together with the
+    labels, and what is selected says which labels follow. Labels that follow are no undo step of their own: they belong
+    to the step of the changed setting, and follow again when that step is redone.
 
     Parameters
     ----------
@@ -61,28 +66,16 @@ class Session:
 
     def __init__(self, preview: Preview) -> None:
         self._cache = MemoryCache()
-        self.job: SegmentationJob | None = None
+        self._kept: dict[str, SegmentationJob] = {}
+        """Jobs by name, the one that was used last at the end."""
         self.message = ""
         """Why labels no longer follow, for the panel."""
-        self.proposed: tuple[str, SegmentationJob] | None = None
-        """The shown but unwritten job with the state of its settings, until it is accepted or discarded."""
+        self.proposed: tuple[dict[str, Any], UpdateJob] | None = None
+        """The shown but unwritten jobs with the values of their settings, until they are accepted or discarded."""
         self.preview = preview
-        self._before: dict[str, Any] = {}
-        """Settings of the labels in the scene."""
-        self._numbers = count(1)
-        self._name = ""
         self._due = 0.0
         self.timer = self.on_timer
-        self._written: dict[str, dict[str, Any]] = {}
-        """Settings of labels that were written, by the state that the scene stores of them."""
-        self._applied_before_undo = ""
-        on = bpy.app.handlers
-        self._handlers = (
-            (on.load_pre, self._on_load), (on.undo_pre, self._before_undo), (on.undo_post, self._on_undo),
-            (on.redo_post, self._on_redo),
-        )  # fmt: skip
-        for handlers, function in self._handlers:
-            handlers.append(function)
+        bpy.app.handlers.load_pre.append(self._on_load)
 
     @property
     def cache(self) -> MemoryCache:
@@ -90,19 +83,57 @@ class Session:
         self._cache.limit = 1_000_000 * preference(bpy.context, "cache_megabytes")
         return self._cache
 
+    @property
+    def job(self) -> SegmentationJob | None:
+        """The kept job that was used last."""
+        return next(reversed(self._kept.values()), None)
+
     def write(self, job: SegmentationJob) -> None:
         """Write a computed job to its scene and keep it; ChangedError if the scene has changed."""
-        scene = job.guard.scene()
-        job.write(follows=self.holds(scene))
-        self._keep(job, scene)
+        job.write()
+        self.withdraw()
+        self.message = ""
+        self._kept.pop(job.name, None)
+        self._kept[job.name] = job
+        while self._kept and sum(_bytes_of(each) for each in self._kept.values()) > MAX_KEPT_BYTES:
+            self._kept.pop(next(iter(self._kept)))
 
     def holds(self, scene: bpy.types.Scene) -> bool:
-        """Whether the labels in a scene are from the kept job."""
-        return self.job is not None and scene.wks_segment.applied.partition(":")[0] == self._name
+        """Whether all labels that would follow in a scene are from kept jobs."""
+        origins = self._followers(scene)
+        return bool(origins) and all(origin.job in self._kept for origin in origins.values())
 
     def is_current(self, scene: bpy.types.Scene) -> bool:
-        """Whether the labels in a scene are from the current settings."""
-        return bool(scene.wks_segment.applied == self._state(scene))
+        """Whether the labels of the object that the fields are about are from the current settings.
+
+        Others that are selected follow with it, but not before a field changes: until then each keeps its own.
+        """
+        settings = scene.wks_segment
+        subject, followers = segment_list.shown_object(settings), self._followers(scene)
+        if subject is None or subject not in followers or settings.shown != subject.data.name:
+            return True
+        return are_alike(followers[subject].settings, values_of(settings))
+
+    def can_update(self, scene: bpy.types.Scene) -> bool:
+        """Whether there are labels that can be updated to the settings, if need be with new signatures."""
+        return bool(self._followers(scene))
+
+    def leads(self, obj: bpy.types.Object) -> bool:
+        """Whether the labels of an object follow the settings once it is selected."""
+        return obj in self._followers(bpy.context.scene)
+
+    def _followers(self, scene: bpy.types.Scene) -> dict[bpy.types.Object, Origin]:
+        """The objects whose labels follow the settings: the chosen ones, if their job is kept or their model is there.
+
+        Transferred labels follow nothing.
+        """
+        rows = {row.uid for row in scene.wks_segment.models}
+        origins = {obj: origin_of(obj.data) for obj in segment_list.chosen(scene.wks_segment)}
+        return {
+            obj: origin
+            for obj, origin in origins.items()
+            if not origin.transferred and (origin.job in self._kept or origin.model in rows)
+        }
 
     @property
     def is_scheduled(self) -> bool:
@@ -127,6 +158,12 @@ class Session:
         if not bpy.app.timers.is_registered(self.timer):
             bpy.app.timers.register(self.timer, first_interval=QUIET_SECONDS)
 
+    def follow(self, scene: bpy.types.Scene) -> None:
+        """After undo, redo or a job, let labels follow settings that are others than theirs."""
+        self.withdraw()
+        if not self.is_current(scene):
+            self.schedule(scene)
+
     def on_timer(self) -> float | None:
         """Called by Blender's timer; return the seconds until the next call, None for no further one."""
         context = bpy.context
@@ -141,9 +178,9 @@ class Session:
             if scene.wks_segment.preview:
                 self.propose(context)
             else:
-                # The operator makes this one step for undo, as if the user had pressed the button.
+                # Without a step for undo: Blender has made one for the setting, and the user sees one change.
                 with context.temp_override(window=window):
-                    bpy.ops.wks_segment.update("EXEC_DEFAULT", True)
+                    bpy.ops.wks_segment.update("EXEC_DEFAULT", False)
         except UserError as error:
             self.message = message_of(error)
         except RuntimeError as error:
@@ -152,36 +189,65 @@ class Session:
         redraw_sidebars(context)
         return None
 
-    def update(self, scene: bpy.types.Scene) -> SegmentationJob:
-        """Run the last job again with the current settings and write it.
+    def updated(self, context: bpy.types.Context) -> UpdateJob:
+        """The jobs of the selected objects with the current settings, not computed unless they are proposed.
+
+        What was not kept is read again, in the current pose.
 
         Raises
         ------
         UserError
-            If there is no job, the settings need another model, or a mesh has changed, which drops the job.
+            If there are none, the settings need another model, or a mesh has changed, which drops its job.
         """
-        if self.job is None:
+        scene, settings = context.scene, context.scene.wks_segment
+        if self.proposed is not None and are_alike(self.proposed[0], values_of(settings)):
+            return self.proposed[1]
+        asleep: dict[str, list[bpy.types.Object]] = {}
+        awake: dict[str, list[bpy.types.Object]] = {}
+        for obj, origin in self._followers(scene).items():
+            group, key = (awake, origin.job) if origin.job in self._kept else (asleep, origin.model)
+            group.setdefault(key, []).append(obj)
+        jobs = []
+        for name, objects in awake.items():
+            with self._dropping(name):
+                jobs.append(self._kept[name].with_settings(settings, objects))
+        for uid, objects in asleep.items():
+            model = model_library.from_text(model_library.text_of(settings, uid))
+            jobs.append(SegmentationJob.applying(context, self.cache, model, objects, uid))
+        if not jobs:
             raise UserError(NOTHING_TO_UPDATE)
-        with self._dropping():
-            job = self._recomputed(scene)
-            self.write(job)
-        return job
+        return UpdateJob(jobs)
+
+    def write_all(self, update: UpdateJob) -> None:
+        """Write computed jobs; UserError if a mesh has changed."""
+        for job in update.jobs:
+            with self._dropping(job.name):
+                self.write(job)
 
     def propose(self, context: bpy.types.Context) -> None:
-        """Show in the viewport what `update` would write."""
-        scene = context.scene
-        with self._dropping():
-            job = self._recomputed(scene)
-            self.proposed, self.message = (self._state(scene), job), ""
-            notes = scene.wks_segment.notes()
-            shown = {character: merge_parts(labels, notes.joined) for character, labels in job.labels.items()}
-            self.preview.show(context, shown, scene.wks_segment.style())
+        """Show in the viewport what an update would write."""
+        update = self.updated(context)
+        if self.proposed is None or update is not self.proposed[1]:
+            update.compute(Progress())
+        self.proposed, self.message = (values_of(context.scene.wks_segment), update), ""
+        shown: dict[Character, IntArray] = {}
+        styles: dict[Character, Style] = {}
+        for job in update.jobs:
+            key = f"{job.uid}/{job.model.n_segments_}"
+            joined, style = notes_of(key).joined, style_of(key)
+            shown |= {character: merge_parts(labels, joined) for character, labels in job.labels.items()}
+            styles |= dict.fromkeys(job.labels, style)
+        for job in update.jobs:
+            with self._dropping(job.name):
+                job.guard.check_fully()
+        self.preview.show(context, shown, styles)
 
     def discard(self, scene: bpy.types.Scene) -> None:
         """Hide the proposed labels and restore the settings of the written ones."""
         self.withdraw()
-        for name, value in self._before.items():
-            setattr(scene.wks_segment, name, value)
+        subject = segment_list.shown_object(scene.wks_segment)
+        if subject is not None:
+            show(scene.wks_segment, origin_of(subject.data).settings)
 
     def withdraw(self) -> None:
         """Hide the proposed labels."""
@@ -189,10 +255,9 @@ class Session:
         self.preview.hide()
 
     def drop(self) -> None:
-        """Forget the kept job."""
+        """Forget the kept jobs."""
         self.withdraw()
-        self.job, self._name = None, ""
-        self._written.clear()
+        self._kept.clear()
 
     def close(self) -> None:
         """Forget everything and remove the handlers, before the extension is disabled."""
@@ -200,87 +265,30 @@ class Session:
         self.cache.clear()
         if bpy.app.timers.is_registered(self.timer):
             bpy.app.timers.unregister(self.timer)
-        for handlers, function in self._handlers:
-            if function in handlers:
-                handlers.remove(function)
-
-    def _keep(self, job: SegmentationJob, scene: bpy.types.Scene) -> None:
-        if job.first is None:
-            self._name = f"job {next(self._numbers)}"
-        self.withdraw()
-        self.job, self.message = job, ""
-        self._before = _values(scene.wks_segment)
-        if sum(described.pose.signature.nbytes for described in set(job.described)) > MAX_KEPT_BYTES:
-            self.drop()
-        scene.wks_segment.applied = self._state(scene)
-        self._written[scene.wks_segment.applied] = dict(self._before)
-
-    def _recomputed(self, scene: bpy.types.Scene) -> SegmentationJob:
-        """The last job computed with the current settings; the proposed one if it has these."""
-        if self.job is None:
-            raise UserError(NOTHING_TO_UPDATE)
-        if self.proposed is not None and self.proposed[0] == self._state(scene):
-            return self.proposed[1]
-        job = self.job.with_settings(scene.wks_segment)
-        job.compute(Progress())
-        return job
+        if self._on_load in bpy.app.handlers.load_pre:
+            bpy.app.handlers.load_pre.remove(self._on_load)
 
     @contextmanager
-    def _dropping(self) -> Iterator[None]:
-        """Drop the job if the scene turns out to have changed."""
+    def _dropping(self, name: str) -> Iterator[None]:
+        """Drop a job if the scene turns out to have changed."""
         try:
             yield
         except ChangedError as error:
-            self.drop()
+            self._kept.pop(name, None)
+            self.withdraw()
             raise UserError(
                 "Segments are no longer updated, learn or apply again: {reason}", reason=message_of(error)
             ) from error
-
-    def _state(self, scene: bpy.types.Scene) -> str:
-        """Name of the job and values of the settings that the labels depend on."""
-        values = _values(scene.wks_segment)
-        if values["auto_segments"]:
-            del values["n_segments"]
-        return f"{self._name}:{values | {'snap_to': sorted(values['snap_to'])}}"
 
     @persistent
     def _on_load(self, *_: Any) -> None:
         self.drop()
         self.message = ""
 
-    @persistent
-    def _before_undo(self, *_: Any) -> None:
-        self._applied_before_undo = bpy.context.scene.wks_segment.applied
 
-    @persistent
-    def _on_undo(self, *_: Any) -> None:
-        self.withdraw()
-        if self.job is None:
-            return
-        if any(member.resolve() is None for pose in self.job.poses for member in pose.character.members):
-            self.drop()
-            return
-        scene = bpy.context.scene
-        if not self.holds(scene) or scene.wks_segment.applied == self._applied_before_undo:
-            return
-        self._before = dict(self._written.get(scene.wks_segment.applied, self._before))
-        if scene.wks_segment.live and not scene.wks_segment.preview:
-            # Blender has one step for a setting and one for the labels that followed it; the user sees one change.
-            self.message = ""
-            for name, value in self._before.items():
-                setattr(scene.wks_segment, name, value)
-
-    @persistent
-    def _on_redo(self, *_: Any) -> None:
-        self.withdraw()
-        scene = bpy.context.scene
-        if self.holds(scene):
-            self._before = dict(self._written.get(scene.wks_segment.applied, self._before))
-
-
-def _values(settings: WKSSegmentSettings) -> dict[str, Any]:
-    """Values of the settings that labels follow."""
-    return {name: getattr(settings, name) for name in FOLLOWED_SETTINGS}
+def _bytes_of(job: SegmentationJob) -> int:
+    first = job.first or job
+    return sum(described.pose.signature.nbytes for described in set(first.described))
 
 
 def session_of(context: bpy.types.Context) -> Session:

@@ -1,34 +1,41 @@
 """The models of a scene: the one in use, the others of the list, and those of the model folder.
 
-The model in use is stored in the settings themselves (`model`, `model_summary`, `part_notes`), where its names and
-colors are read and written. The row of any other model stores the same until it is used. The active row is the model
-in use.
+The model in use, which *Apply to Selected* applies, is stored in the settings themselves (`model`, `model_summary`).
+The row of any other model stores the same until it is used. The active row is the model in use. Names and colors are
+kept by label set (`props.label_set`), which rows and labeled meshes know by its key.
 """
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator, Sequence
 from datetime import date
+from hashlib import blake2b
+from itertools import count
 from pathlib import Path
 from typing import Any
 
-from ...core import ModelFileError, PoseSegmentation
-from ...core.message import message_of
+from ...core import ModelFileError, PartNotes, PoseSegmentation, model_file
+from ...core.message import Message, message_of
 from ..errors import UserError
+from ..parts.part_style import SetNotes
+from ..props.changes import unheard
 from ..props.settings import WKSSegmentSettings
+from ..scene.file_content import name_of
 from .certainty import certainty_lines
-from .stored_messages import as_json, as_text, restored
+from .stored_messages import as_json, as_text, from_json, restored
 
 DEFAULT_MODEL_NAME = "Model"
 """Name of a model without a known origin."""
 MAX_NAME_LETTERS = 60
 """Letters of a model's name; Blender's own names have at most 63 bytes."""
+LEARNED_FROM = "learned_from"
+"""Field of a model file for the lines on what the model was learned from."""
 ROW_STORES = {
     "model": "model",
     "summary": "model_summary",
     "summary_messages": "model_summary_messages",
-    "notes": "part_notes",
 }
 """Property of a row by which it stores a property of the settings while its model is not in use."""
 
@@ -39,19 +46,49 @@ def active_row(settings: WKSSegmentSettings) -> Any | None:
     return settings.models[index] if 0 <= index < len(settings.models) else None
 
 
+def row_of(settings: WKSSegmentSettings, uid: str) -> Any | None:
+    """The row of the model with an identity; None if there is none."""
+    return next((row for row in settings.models if uid and row.uid == uid), None)
+
+
 def list_active(settings: WKSSegmentSettings) -> None:
     """Add a row for the model in use if it has none, because a script has set it in the settings only."""
     if not settings.model or active_row(settings) is not None:
         return
     first, *rest = settings.model_summary.splitlines() or [""]
     counted = re.search(r"(\d+) segments", " ".join(rest))
-    _add_row(settings, first.removeprefix("From ").removesuffix(" …"), int(counted[1]) if counted else 0, "")
+    try:
+        n_segments = int(counted[1]) if counted else from_text(settings.model).n_segments_
+    except UserError:
+        n_segments = 0  # a damaged model is refused when it is used
+    row = _add_row(settings, first.removeprefix("From ").removesuffix(" …"), n_segments, "")
+    row.uid = identity(settings, settings.model)
 
 
-def keep(
-    settings: WKSSegmentSettings, model: PoseSegmentation, summary: Sequence[str], name: str = "", add: bool = False
-) -> None:
-    """Make a fitted model the one in use, with the names and colors that are in the settings.
+def identity(settings: WKSSegmentSettings, text: str, learned_from: str = "", replaced: str = "") -> str:
+    """Identity of a model with this JSON text, the same whenever the same is learned from the same objects.
+
+    Another than those of the other models of the scene.
+    """
+    taken = {row.uid for row in settings.models} - {replaced}
+    salts = (f"{learned_from}{number or ''}" for number in count())
+    uids = (blake2b(f"{salt}\n{text}".encode(), digest_size=8).hexdigest() for salt in salts)
+    return next(uid for uid in uids if uid not in taken)
+
+
+def text_of(settings: WKSSegmentSettings, uid: str) -> str:
+    """JSON text of the model with an identity; empty if there is none."""
+    row = row_of(settings, uid)
+    return "" if row is None else str(settings.model if row == active_row(settings) else row.model)
+
+
+def learned(
+    settings: WKSSegmentSettings, model: PoseSegmentation, summary: Sequence[str], names: Sequence[str],
+    character: str,
+) -> str:  # fmt: skip
+    """Keep a learned model and use it; return the key of its label set.
+
+    It replaces the model that was learned from the same objects before, unless the user wants to keep both.
 
     Parameters
     ----------
@@ -59,22 +96,56 @@ def keep(
     model : PoseSegmentation
     summary
         Lines on what it was learned from.
-    name : str
-        Name of a new row. Without one the model is the one in use with other settings, and keeps its date.
-    add : bool
-        Add a row instead of replacing the model in use. Call `store_active` before the names and colors in the
-        settings become those of the new model.
+    names
+        Names of the objects that it was learned from.
+    character : str
+        Name of a new row.
     """
     list_active(settings)
-    row, today = active_row(settings), date.today().isoformat()
-    if add or row is None:
-        _add_row(settings, name, model.n_segments_, today)
-    else:
-        row.n_segments, row.date = model.n_segments_, today if name else row.date
-    settings.applied = ""
-    settings.model = model.to_json()
+    learned_from = json.dumps(sorted(names))
+    own = next((row for row in settings.models if row.learned_from == learned_from), None)
+    replaced = None if settings.keep_models else own
+    model.part_notes_ = PartNotes()
+    text = model.to_json()
+    uid = identity(settings, text, learned_from, "" if replaced is None else replaced.uid)
+    store_active(settings)
+    row = replaced or _add_row(settings, character, model.n_segments_, "")
+    settings.used_model = settings.active_model = next(i for i, each in enumerate(settings.models) if each == row)
+    row.uid, row.learned_from = uid, learned_from
+    row.n_segments, row.date = model.n_segments_, date.today().isoformat()
+    for name in ROW_STORES:
+        setattr(row, name, "")
+    settings.model = text
     lines = [*summary, *certainty_lines(model)]
     settings.model_summary, settings.model_summary_messages = as_text(lines), as_json(lines)
+    return str(row.labels())
+
+
+def adjusted(settings: WKSSegmentSettings, uid: str, model: PoseSegmentation) -> str:
+    """Keep a model of the scene, if it is there, as it was applied last; return the key of its labels.
+
+    That is with another number of segments or smoothness: applied again, it gives the same labels.
+    """
+    row = row_of(settings, uid)
+    if row is not None:
+        model.part_notes_ = PartNotes()
+        place: Any = settings if row == active_row(settings) else row
+        names = list(ROW_STORES.values() if place is settings else ROW_STORES.keys())
+        setattr(place, names[0], model.to_json())
+        if row.n_segments != model.n_segments_:
+            row.n_segments = model.n_segments_
+            origin = (restored(*(getattr(place, name) for name in names[1:])) or [""])[0]
+            lines = [origin, Message("{count} segments", count=model.n_segments_), *certainty_lines(model)]
+            setattr(place, names[1], as_text(lines))
+            setattr(place, names[2], as_json(lines))
+    return f"{uid}/{model.n_segments_}"
+
+
+def used_uid(settings: WKSSegmentSettings) -> str:
+    """Identity of the model in use."""
+    list_active(settings)
+    row = active_row(settings)
+    return "" if row is None else str(row.uid)
 
 
 def summary_of(settings: WKSSegmentSettings) -> list[str]:
@@ -91,11 +162,21 @@ def store_active(settings: WKSSegmentSettings) -> None:
             setattr(row, name, getattr(settings, place))
 
 
-def add_model(settings: WKSSegmentSettings, model: PoseSegmentation, name: str, summary: Sequence[str]) -> None:
-    """Add a model with its own names and colors to the list, and use it."""
+def add_model(settings: WKSSegmentSettings, model: PoseSegmentation, name: str, summary: Sequence[str]) -> str:
+    """Add a model with its own names and colors to the list, and use it; return the key of its label set."""
+    list_active(settings)
+    notes, model.part_notes_ = model.part_notes_, PartNotes()
+    text = model.to_json()
+    uid = identity(settings, text)
     store_active(settings)
-    settings.keep_notes(model.part_notes_)
-    keep(settings, model, summary, name, add=True)
+    row = _add_row(settings, name, model.n_segments_, date.today().isoformat())
+    row.uid = uid
+    lines = [*summary, *certainty_lines(model)]
+    settings.model = text
+    settings.model_summary, settings.model_summary_messages = as_text(lines), as_json(lines)
+    settings.keep_notes(SetNotes.of(notes))
+    _show_number(settings, row)
+    return str(row.labels())
 
 
 def use(settings: WKSSegmentSettings, index: int) -> None:
@@ -113,19 +194,22 @@ def use(settings: WKSSegmentSettings, index: int) -> None:
 def duplicate(settings: WKSSegmentSettings) -> None:
     """Copy the model in use, with its names and colors, and use the copy; UserError if there is none."""
     row = _stored_active_row(settings)
-    _add_row(settings, row.name, row.n_segments, row.date)
+    index, notes, uid = settings.used_model, settings.notes(), identity(settings, settings.model)
+    copy = _add_row(settings, row.name, row.n_segments, row.date)
+    copy.uid, copy.learned_from = uid, settings.models[index].learned_from
+    settings.keep_notes(notes)
 
 
 def remove(settings: WKSSegmentSettings) -> None:
     """Remove the model in use, and use the next one; UserError if there is none.
 
-    The names and colors of the last model stay, because labels on meshes use them.
+    Names and colors stay, because labels on meshes use them.
     """
     _stored_active_row(settings)
     index = settings.used_model
     settings.models.remove(index)
     settings.used_model = -1
-    settings.applied = settings.model = settings.model_summary = settings.model_summary_messages = ""
+    settings.model = settings.model_summary = settings.model_summary_messages = ""
     if len(settings.models):
         _take(settings, min(index, len(settings.models) - 1))
 
@@ -149,12 +233,22 @@ def from_text(text: str) -> PoseSegmentation:
         raise UserError("The model in this file cannot be used: {reason}", reason=message_of(error)) from error
 
 
+def save(model: PoseSegmentation, path: Path, summary: Sequence[str]) -> None:
+    """Write a model to a file, with the lines on what it was learned from; errors as of `PoseSegmentation.save`."""
+    model_file.write(path, json.dumps(json.loads(model.to_json()) | {LEARNED_FROM: as_json(summary)}))
+
+
+def summary_in(path: Path) -> list[str]:
+    """Lines on what the model in a file was learned from; none if the file has none."""
+    return from_json(json.loads(model_file.read(path)).get(LEARNED_FROM))
+
+
 def in_folder(folder: str | Path) -> dict[str, Path]:
     """Files of a model folder by name without suffix; none if there is no such folder."""
     path = Path(folder)
     if not str(folder) or not path.is_dir():
         return {}
-    return {file.stem: file for file in sorted(path.glob("*.json"))}
+    return {name_of(file): file for file in sorted(path.glob("*.json"))}
 
 
 def all_of(settings: WKSSegmentSettings) -> Iterator[tuple[str, str]]:
@@ -188,13 +282,24 @@ def _take(settings: WKSSegmentSettings, index: int) -> None:
     """Move the model of a row into the settings, whose own model must be stored in its row."""
     row = settings.models[index]
     settings.used_model, settings.active_model = index, index
-    settings.applied = ""
     for name, place in ROW_STORES.items():
         setattr(settings, place, getattr(row, name))
         setattr(row, name, "")  # a model can be large, and is not stored twice
+    _show_number(settings, row)
 
 
-def _add_row(settings: WKSSegmentSettings, name: str, n_segments: int, day: str) -> None:
+def _show_number(settings: WKSSegmentSettings, row: Any) -> None:
+    """Show the number of segments of a model in the field, since that is the number that it is applied with.
+
+    Labels do not follow: the field is not about the active object now.
+    """
+    if not settings.auto_segments and row.n_segments:
+        with unheard():
+            settings.n_segments = row.n_segments
+        settings.shown = ""
+
+
+def _add_row(settings: WKSSegmentSettings, name: str, n_segments: int, day: str) -> Any:
     """Add a row at the end for the model in the settings."""
     names = {row.name for row in settings.models}
     row = settings.models.add()
@@ -202,6 +307,7 @@ def _add_row(settings: WKSSegmentSettings, name: str, n_segments: int, day: str)
     # In this order, so that the change of the active row uses no other model.
     settings.used_model = len(settings.models) - 1
     settings.active_model = settings.used_model
+    return row
 
 
 def _unique(name: str, taken: set[str]) -> str:

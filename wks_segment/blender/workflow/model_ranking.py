@@ -14,6 +14,7 @@ from ...core.message import Message, message_of
 from ...core.progress import Progress
 from ..errors import UserError
 from ..props.preferences import model_folder
+from ..props.settings import WKSSegmentSettings
 from ..scene import poses as reader
 from ..scene.change_guard import ChangeGuard
 from ..scene.characters import group, selected_meshes
@@ -63,10 +64,59 @@ def models_to_rank(context: bpy.types.Context, report: Report) -> list[NamedMode
             models.append(NamedModel(name, PoseSegmentation.from_json(text)))
         except ValueError as error:
             report.warn(Message('The model "{name}" was left out: {reason}', name=name, reason=message_of(error)))
-    models += models_in_files(model_library.in_folder(model_folder(context)), report)
+    models = without_copies([*models, *models_in_files(model_library.in_folder(model_folder(context)), report)])
     if not models:
         raise UserError("No model yet: learn one, import one, or set Model Folder in the preferences of the add-on")
     return models
+
+
+def without_copies(models: Sequence[NamedModel]) -> list[NamedModel]:
+    """The models without those that have learned the same as one before, whatever their number of segments.
+
+    A copy would halve the probability of its original.
+    """
+    learned: dict[bytes, NamedModel] = {}
+    for named in models:
+        mixture = named.model.mixture_
+        learned.setdefault(mixture.weights.tobytes() + mixture.means.tobytes(), named)
+    return list(learned.values())
+
+
+def fit_warning(models: Sequence[NamedModel], described: Sequence[PoseSignature], character: str) -> Message | None:
+    """A warning that the first of some models does not fit a character, as *Rank Models* knows it; None if it may.
+
+    Only models that take the same signature as the first are compared with it, since others would need another one.
+    """
+    alike = described_alike([named.model for named in models])[0]
+    compared = without_copies([models[i] for i in alike])
+    ranking = rank([named.model for named in compared], [described] * len(compared))
+    best = compared[ranking.best.index].name
+    if ranking.verdict == "nothing fits":
+        return Message(
+            '"{model}" does not fit "{character}", and no other model does: learn a new one',
+            model=models[0].name, character=character,
+        )  # fmt: skip
+    if ranking.best.index > 0 and ranking.verdict == "sure":
+        return Message(
+            '"{model}" does not fit "{character}": "{better}" fits better',
+            model=models[0].name, character=character, better=best,
+        )  # fmt: skip
+    return None
+
+
+def models_of(settings: WKSSegmentSettings, uid: str) -> list[NamedModel]:
+    """The models of a scene that can be read, the one with an identity first; none if it is not there."""
+    rows = sorted(settings.models, key=lambda row: row.uid != uid)
+    if not rows or rows[0].uid != uid:
+        return []
+    found = []
+    for row in rows:
+        try:
+            found.append(NamedModel(row.name, PoseSegmentation.from_json(model_library.text_of(settings, row.uid))))
+        except ValueError:
+            if row.uid == uid:
+                return []
+    return found
 
 
 def models_in_files(paths: Mapping[str, Path], report: Report) -> list[NamedModel]:

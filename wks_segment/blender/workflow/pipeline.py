@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+import bpy
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -19,16 +20,18 @@ from ...core.poses.describe import LEARNING
 from ...core.progress import Progress
 from ...core.spectral.memory import available_memory
 from ..errors import TooLargeError, UserError
-from ..outputs.labels import write_labels
+from ..outputs.labels import rewrite_labels, write_labels
 from ..outputs.marked_edges import marked_pairs
 from ..outputs.options import OutputOptions
+from ..outputs.origin import Origin, enter_origin, origin_of
 from ..outputs.vertex_weights import soft_weights, weights_of_parts
 from ..parts import part_ids
+from ..props.label_set import style_of
 from ..props.settings import WKSSegmentSettings
 from ..scene.characters import Character, polygon_ranges, vertex_ranges
 from ..scene.mesh_arrays import Body
 from ..scene.poses import Pose
-from . import model_library, segment_list
+from . import carry_over, model_library, segment_list
 from .describing import Run, describe, prepare
 from .report import Report
 
@@ -63,15 +66,7 @@ class LabelRequest:
         return cls(
             settings.min_share / 100,
             settings.sides,
-            OutputOptions(
-                colors=settings.write_colors,
-                materials=settings.write_materials,
-                template=settings.material_template.name if settings.material_template is not None else "",
-                vertex_groups=settings.vertex_groups,
-                face_sets=settings.write_face_sets,
-                seams=settings.write_seams,
-                style=settings.style(),
-            ),
+            options_of(settings),
             {
                 character: Body.of(character, marked_pairs(character, settings.snap_to))
                 for character in dict.fromkeys(characters)
@@ -223,31 +218,58 @@ def poses_by_mesh(poses: Sequence[Pose]) -> list[list[int]]:
 
 def write_outputs(
     settings: WKSSegmentSettings, labels: dict[Character, IntArray], request: LabelRequest, report: Report,
-    weights: dict[Character, dict[int, FloatArray]] | None = None, renumbered: bool = False,
+    weights: dict[Character, dict[int, FloatArray]] | None = None, origin: Origin | None = None,
 ) -> None:  # fmt: skip
     """Write labels with the user's edits, and the weights from `soften`, to the objects of each character.
 
-    If a new model may number parts differently from the labels on the objects (`renumbered`), the user's names, colors
-    and faces by hand are carried over first.
+    Names, colors, merges and faces by hand are those of the label set that the labels are from; without an `origin`
+    that of each mesh, since only the labels are new.
     """
     if weights is None and request.outputs.vertex_groups == "soft":
         report.warn("The vertex groups are hard: only a model gives the probabilities of soft ones (Apply to Selected)")
-    if renumbered:
-        segment_list.carry_over(settings, labels)
-    notes, style, written = settings.notes(), settings.style(), [np.zeros(0, dtype=np.int64)]
+    names: dict[str, int] = {}
     not_taken_back: list[str] = []
-    options = replace(request.outputs, style=style)
     with report.stage("write"):
+        if origin is not None:
+            carry_over.change_sets(settings, labels, origin.labels)
         for character, parts in labels.items():
             ranges = zip(polygon_ranges(character), vertex_ranges(character), strict=True)
             for (obj, polygons), (_, vertices) in ranges:
                 if polygons.stop == polygons.start:
                     continue
                 own = None if weights is None else {part: w[vertices] for part, w in weights[character].items()}
-                written.append(write_labels(obj.data, parts[polygons], options, notes.joined, own, not_taken_back))
+                from_ = origin_of(obj.data) if origin is None else origin
+                notes, style = settings.notes(from_.labels), style_of(from_.labels)
+                options = replace(request.outputs, style=style)
+                written = write_labels(obj.data, parts[polygons], options, notes.joined, own, not_taken_back)
+                enter_origin(obj.data, from_)
+                names |= {style.name_of(part): part for part in part_ids.unique_parts(written)}
         segment_list.fill(settings)
     report.warn(*not_taken_back)
-    report.parts = {style.name_of(part): part for part in part_ids.unique_parts(np.concatenate(written))}
+    in_order = part_ids.unique_parts(np.array(list(names.values()), dtype=np.int64))
+    report.parts = {name: part for part in in_order for name, number in names.items() if number == part}
+
+
+def options_of(settings: WKSSegmentSettings) -> OutputOptions:
+    """What the settings ask to be written."""
+    return OutputOptions(
+        colors=settings.write_colors,
+        materials=settings.write_materials,
+        template=settings.material_template.name if settings.material_template is not None else "",
+        vertex_groups=settings.vertex_groups,
+        face_sets=settings.write_face_sets,
+        seams=settings.write_seams,
+    )
+
+
+def rewrite_outputs(settings: WKSSegmentSettings, mesh: bpy.types.Mesh, warnings: list[str]) -> None:
+    """Write the labels of a mesh again with the outputs of the settings; soft groups stay, or are hard.
+
+    `warnings` gets what was not taken back of the labels before, and why.
+    """
+    origin = origin_of(mesh)
+    options = replace(options_of(settings), style=style_of(origin.labels))
+    rewrite_labels(mesh, options.style, settings.notes(origin.labels).joined, warnings, options)
 
 
 def stored_model(settings: WKSSegmentSettings) -> PoseSegmentation:

@@ -114,6 +114,19 @@ def segment_warnings(model: PoseSegmentation, report: Report) -> list[str]:
     ]
 
 
+def absent_warnings(model: PoseSegmentation, report: Report) -> list[str]:
+    """Warning that segments of an applied model do not occur on the objects; none if all occur."""
+    absent = model.n_segments_ - report.n_segments
+    if absent <= 0:
+        return []
+    return [
+        Message(
+            "{absent} of the model's {count} segments are not on these objects, or are below Smallest Part",
+            absent=absent, count=model.n_segments_,
+        )
+    ]  # fmt: skip
+
+
 def shape_warnings(poses: Sequence[Pose]) -> list[str]:
     """Warnings that triangles of a pose are far too long for its mesh, one for each character."""
     warnings: dict[Character, str] = {}

@@ -2,50 +2,87 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 
 import bpy
 import numpy as np
 
-from ...core import PartNotes
-from ...core.mesh.triangle_mesh import IntArray
 from ...core.user_labels import LONGEST_NAME
 from ..outputs.color_attribute import recolor_faces
 from ..outputs.labels import rewrite_labels
-from ..outputs.overrides import by_hand, keep_by_hand, model_labels
+from ..outputs.origin import origin_of
+from ..outputs.overrides import by_hand
 from ..outputs.part_attributes import has_labels, labels_on
-from ..outputs.part_materials import part_of, restyle_material
+from ..outputs.part_materials import LABELS_PROPERTY, part_of, restyle_material
 from ..outputs.separate import followed
 from ..outputs.vertex_groups import rename_group
 from ..parts import part_ids
-from ..parts.palette import most_different
+from ..parts.palette import MAX_COLORS
+from ..parts.part_style import Style
+from ..props.label_set import notes_of, style_of
 from ..props.settings import WKSSegmentSettings
 from ..scene.attributes import read_bools, read_floats
-from ..scene.characters import Character, mesh_objects, polygon_ranges, with_rigged
+from ..scene.characters import mesh_objects, same_body, with_rigged
 from ..scene.simulations import may_change
 from .all_or_nothing import all_or_nothing
 
-SUCCESSOR_OVERLAP = 0.5
-"""Common area of an old and a new part, as a share of what they cover together, above which the new part is the old
-one's successor. At one half or more a part has at most one successor."""
+OTHER_COLORS = range(24, MAX_COLORS)
+"""Colors of the palette for parts that a person makes: no segment has these, since models hardly have so many."""
 
 
-def labeled(settings: WKSSegmentSettings, everywhere: bool = False) -> list[bpy.types.Object]:
-    """Objects of the scene with labels: those in Edit Mode, or else the selected ones, or else all.
+def labeled(settings: WKSSegmentSettings) -> list[bpy.types.Object]:
+    """Objects that buttons work on: those with labels in Edit Mode, or else the selected ones.
 
-    With `everywhere` always all of them.
+    Only those whose labels are of the same set as those of the active object, since a number means nothing in another.
     """
-    with_labels = [obj for obj in settings.id_data.objects if obj.type == "MESH" and has_labels(obj.data)]
-    local = [obj for obj in mesh_objects(with_labels) if obj.library is None and obj.data.library is None]
-    if everywhere:
-        return local
-    # In Object Mode, an object is in Edit Mode only in another window or beside the active one.
-    in_edit_mode = [obj for obj in local if obj.mode == "EDIT" and bpy.context.mode == "EDIT_MESH"]
+    subject = shown_object(settings)
+    if subject is None:
+        return []
+    labels = origin_of(subject.data).labels
+    return [obj for obj in chosen(settings) if origin_of(obj.data).labels == labels]
+
+
+def shown_object(settings: WKSSegmentSettings) -> bpy.types.Object | None:
+    """The object whose segments are listed: the active one if it has labels, or else the first chosen one."""
+    candidates, active = chosen(settings), _active(settings)
+    return active if active in candidates else next(iter(candidates), None)
+
+
+def chosen(settings: WKSSegmentSettings) -> list[bpy.types.Object]:
+    """Objects with labels that are in Edit Mode, or else those that are selected, or that a selected armature moves.
+
+    With nothing selected, the active one, or else the first one.
+    """
     objects = settings.id_data.objects
-    selected = with_rigged((obj for obj in objects if obj.select_get()), (obj for obj in objects if obj.visible_get()))
-    return in_edit_mode or [obj for obj in local if obj in selected] or local
+    # In Object Mode, an object is in Edit Mode only in another window or beside the active one.
+    if bpy.context.mode == "EDIT_MESH":
+        in_edit_mode = [obj for obj in _with_labels(objects) if obj.mode == "EDIT"]
+        if in_edit_mode:
+            return in_edit_mode
+    selected = [obj for obj in objects if obj.select_get()]
+    if selected:
+        return _with_labels(with_rigged(selected, (obj for obj in objects if obj.visible_get())))
+    everywhere, active = _with_labels(objects), _active(settings)
+    return [active] if active in everywhere else everywhere[:1]
+
+
+def objects_with(labels: str) -> list[bpy.types.Object]:
+    """All objects of the file whose labels are of a set."""
+    return [obj for obj in _with_labels(bpy.data.objects) if origin_of(obj.data).labels == labels]
+
+
+def _active(settings: WKSSegmentSettings) -> bpy.types.Object | None:
+    """The active object, if it is in the scene of these settings."""
+    active = bpy.context.view_layer.objects.active
+    return active if bpy.context.scene == settings.id_data else None
+
+
+def _with_labels(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Objects of this file with labels."""
+    found = mesh_objects(obj for obj in objects if obj.type == "MESH" and has_labels(obj.data))
+    return [obj for obj in found if obj.library is None and obj.data.library is None]
 
 
 def meshes_of(objects: list[bpy.types.Object]) -> list[bpy.types.Mesh]:
@@ -54,14 +91,18 @@ def meshes_of(objects: list[bpy.types.Object]) -> list[bpy.types.Mesh]:
 
 
 def fill(settings: WKSSegmentSettings) -> None:
-    """List the parts on the labeled objects with their shares of the area. The active part stays active."""
-    active = active_part(settings)
+    """List the parts of the active object's character with their shares of its area. The active part stays active.
+
+    The fields keep what they show: `followed_settings.follow_active` changes them, too.
+    """
+    active, subject = active_part(settings), shown_object(settings)
+    settings.shown = "" if subject is None else subject.data.name
     area: dict[int, float] = {}
     visible: dict[int, bool] = {}
-    settings.faces_by_hand = 0
-    for obj in labeled(settings):
+    settings.faces_by_hand = sum(_count_by_hand(mesh) for mesh in meshes_of(labeled(settings)) if _is_readable(mesh))
+    for obj in [] if subject is None else _character_of(subject):
         labels = labels_on(obj.data)
-        if labels is None or (obj.data.is_editmode and bpy.context.mode != "EDIT_MESH"):
+        if labels is None or not _is_readable(obj.data):
             continue
         # An object's scale counts, since the objects of a character can have different ones.
         scale = abs(np.linalg.det(np.array(obj.matrix_world)[:3, :3])) ** (2 / 3)
@@ -71,21 +112,41 @@ def fill(settings: WKSSegmentSettings) -> None:
             in_part = labels == part
             area[part] = area.get(part, 0.0) + float(areas[in_part].sum())
             visible[part] = visible.get(part, False) or bool(shown[in_part].any())
-        settings.faces_by_hand += int((by_hand(obj.data) >= 0).sum())
     total = sum(area.values()) or 1.0
     settings.segments.clear()
     for part in part_ids.unique_parts(np.array(list(area), dtype=np.int64)):
         item = settings.segments.add()
+        item.labels = "" if subject is None else origin_of(subject.data).labels
         item.number, item.share, item.hidden = part, 100 * area[part] / total, not visible[part]
         if part == active:
             settings.active_segment = len(settings.segments) - 1
     settings.active_segment = max(min(settings.active_segment, len(settings.segments) - 1), 0)
 
 
+def _is_readable(mesh: bpy.types.Mesh) -> bool:
+    """Whether the labels of a mesh can be read: Blender gives whole attributes only outside of Edit Mode."""
+    return not mesh.is_editmode
+
+
+def _count_by_hand(mesh: bpy.types.Mesh) -> int:
+    return int((by_hand(mesh) >= 0).sum())
+
+
+def _character_of(subject: bpy.types.Object) -> list[bpy.types.Object]:
+    """The objects of one character, with labels of the same set."""
+    alike = objects_with(origin_of(subject.data).labels)
+    return same_body(subject, alike)
+
+
 def active_part(settings: WKSSegmentSettings) -> int | None:
     """Number of the active part in the list; None if the list is empty."""
     index = settings.active_segment
     return settings.segments[index].number if index < len(settings.segments) else None
+
+
+def active_labels(settings: WKSSegmentSettings) -> str:
+    """Key of the label set that the list shows."""
+    return str(settings.segments[0].labels) if settings.segments else ""
 
 
 def activate(settings: WKSSegmentSettings, part: int) -> None:
@@ -95,8 +156,8 @@ def activate(settings: WKSSegmentSettings, part: int) -> None:
         settings.active_segment = numbers.index(part)
 
 
-def rewrite_all(settings: WKSSegmentSettings, objects: list[bpy.types.Object] | None = None) -> list[str]:
-    """Write the labels of objects (None: of all in the scene) again with the user's current edits, and list them.
+def rewrite_all(settings: WKSSegmentSettings, labels: str, objects: list[bpy.types.Object] | None = None) -> list[str]:
+    """Write the labels of objects (None: all of a label set) again with the user's current edits, and list them.
 
     Returns
     -------
@@ -104,22 +165,23 @@ def rewrite_all(settings: WKSSegmentSettings, objects: list[bpy.types.Object] | 
         What was not taken back of the labels before, and why.
     """
     warnings: list[str] = []
-    notes, written = settings.notes(), labeled(settings, everywhere=True) if objects is None else objects
+    written = objects_with(labels) if objects is None else objects
     with followed(written):
         for mesh in meshes_of(written):
-            rewrite_labels(mesh, settings.style(), notes.joined, warnings)
+            rewrite_labels(mesh, style_of(labels), notes_of(labels).joined, warnings)
     fill(settings)
     return warnings
 
 
-def rename(settings: WKSSegmentSettings, part: int, name: str) -> None:
-    """Rename a part and its other side, with the suffix of each side, wherever their names are written.
+def rename(settings: WKSSegmentSettings, labels: str, part: int, name: str) -> None:
+    """Rename a part of a label set and its other side, with the suffix of each side, wherever the names are written.
 
     A name that another part has gets a number. An empty name restores the default.
     """
-    notes, style = settings.notes(), settings.style()
+    notes, style = notes_of(labels), style_of(labels)
     siblings = part_ids.siblings_of(part)
-    numbers = {*notes.names, *(item.number for item in settings.segments)} - set(siblings)
+    listed = {item.number for item in settings.segments if item.labels == labels}
+    numbers = {*range(part_ids.number_of(labels)), *listed, *notes.names} - set(siblings)
     taken = {style.name_of(number) for number in numbers}
     base = "".join(letter for letter in name if letter.isprintable()).strip()
     new_names = {sibling: _suffixed(base, sibling) for sibling in siblings}
@@ -129,95 +191,71 @@ def rename(settings: WKSSegmentSettings, part: int, name: str) -> None:
         number = f"{'.' if base[-1].isdigit() else ' '}{repeated}"
         new_names = {sibling: _suffixed(base, sibling, number) for sibling in siblings}
     other_names = {number: other for number, other in notes.names.items() if number not in siblings}
-    names = {sibling: new for sibling, new in new_names.items() if base and new != part_ids.default_name(sibling)}
-    settings.keep_notes(replace(notes, names=other_names | names))
+    unnamed = style_without(style, siblings)
+    names = {sibling: new for sibling, new in new_names.items() if base and new != unnamed.name_of(sibling)}
+    settings.keep_notes(replace(notes, names=other_names | names), labels)
     for sibling in siblings:
-        restyle(settings, sibling, color=False)
+        restyle(labels, sibling, color=False)
 
 
-def recolor(settings: WKSSegmentSettings, part: int, color: tuple[float, float, float]) -> None:
-    """Give a part a color wherever its color is written."""
-    notes = settings.notes()
-    settings.keep_notes(replace(notes, colors={**notes.colors, part: color}))
-    restyle(settings, part, name=False)
+def style_without(style: Style, parts: Iterable[int]) -> Style:
+    """A style without the user's names of some parts."""
+    names = {part: name for part, name in style.names.items() if part not in set(parts)}
+    return replace(style, names=names)
 
 
-def restyle(settings: WKSSegmentSettings, part: int, name: bool = True, color: bool = True) -> None:
-    """Write the current name or color of a part wherever it is written already."""
-    style, objects = settings.style(), labeled(settings, everywhere=True)
+def recolor(settings: WKSSegmentSettings, labels: str, part: int, color: tuple[float, float, float]) -> None:
+    """Give a part of a label set a color wherever its color is written."""
+    notes = notes_of(labels)
+    settings.keep_notes(replace(notes, colors={**notes.colors, part: color}), labels)
+    restyle(labels, part, name=False)
+
+
+def choose_palette(settings: WKSSegmentSettings) -> None:
+    """Give the chosen objects, and those that share their model, the colors of the palette in the settings."""
+    models = {origin_of(obj.data).model for obj in chosen(settings)}
+    for labels in [row.name for row in settings.label_sets if part_ids.model_of(row.name) in models]:
+        settings.keep_notes(replace(notes_of(labels), palette=settings.palette), labels)
+        restyle(labels, name=False)
+
+
+def restyle(labels: str, part: int | None = None, name: bool = True, color: bool = True) -> None:
+    """Write the current name or color of a part of a label set (None: of all) wherever it is written already."""
+    style, objects = style_of(labels), objects_with(labels)
     with leaving_edit_mode(bpy.context) if color else nullcontext(), followed(objects):
         # A mesh can be in Edit Mode in another window; one whose simulation is not baked follows with its next labels.
         meshes = [mesh for mesh in meshes_of(objects) if may_change(mesh)]
         for mesh in (mesh for mesh in meshes if not mesh.is_editmode or not color):
-            if name:
-                rename_group(mesh, part, style)
-            if color:
-                recolor_faces(mesh, part, style)
+            present = labels_on(mesh) if part is None else None
+            for each in [part] if part is not None else [] if present is None else np.unique(present).tolist():
+                if name:
+                    rename_group(mesh, each, style)
+                if color:
+                    recolor_faces(mesh, each, style)
         for material in bpy.data.materials:
-            if part_of(material) == part:
+            shown = part_of(material)
+            if shown is not None and part in (None, shown) and material.get(LABELS_PROPERTY, "") == labels:
                 restyle_material(material, style, name, color)
 
 
-def make_part(settings: WKSSegmentSettings, name: str, side: int = 0) -> int:
-    """Add a part with this name and a color that is far from all others; return its number."""
-    notes, style = settings.notes(), settings.style()
-    taken = {item.number for item in settings.segments} | notes.names.keys() | notes.joined.keys()
-    for mesh in meshes_of(labeled(settings, everywhere=True)):
-        taken |= set(np.unique(by_hand(mesh)).tolist())
+def make_part(settings: WKSSegmentSettings, labels: str, name: str, side: int = 0) -> int:
+    """Add a part to a label set with this name, and a color that no other part has; return its number."""
+    notes, style = notes_of(labels), style_of(labels)
+    listed = {item.number for item in settings.segments if item.labels == labels}
+    model = part_ids.model_of(labels)
+    # No other set of the model has this number either, so that faces by hand mean the same in all of them.
+    others = [notes_of(row.name) for row in settings.label_sets if part_ids.model_of(row.name) == model]
+    taken = {part for each in others for part in (*each.names, *each.colors, *each.looks, *each.joined)} | listed
+    for mesh in bpy.data.meshes:
+        if has_labels(mesh) and origin_of(mesh).model == model and _is_readable(mesh):
+            taken |= set(np.unique(by_hand(mesh)).tolist())
     taken.discard(-1)
     part = part_ids.free_part(taken, side)
-    colored = {item.number for item in settings.segments} | notes.colors.keys()
-    color = most_different(style.colors_of(np.array(sorted(colored), dtype=np.int64)))
-    red, green, blue = color.tolist()
-    settings.keep_notes(replace(notes, colors={**notes.colors, part: (red, green, blue)}))
-    rename(settings, part, name)
+    colored = np.array(sorted({*range(OTHER_COLORS.start), *listed, *notes.colors, *notes.looks}), dtype=np.int64)
+    look = style.free_look(colored, OTHER_COLORS)
+    settings.keep_notes(replace(notes, looks={**notes.looks, part % part_ids.SIDE_STEP: look}), labels)
+    rename(settings, labels, part, name)
     return part
-
-
-def carry_over(settings: WKSSegmentSettings, labels: Mapping[Character, IntArray]) -> None:
-    """Carry names, colors and faces by hand over from the parts of an old model to their successors in a new one.
-
-    Call it with the new labels before they are written. A part's successor covers more than half of the area that the
-    two cover together. Faces by hand of a part without a successor become a new part.
-    """
-    notes, style = settings.notes(), settings.style()
-    by_hand_on = {mesh: by_hand(mesh) for mesh in meshes_of(labeled(settings, everywhere=True))}
-    present = {part for parts in by_hand_on.values() for part in np.unique(parts[parts >= 0]).tolist()}
-    made = {part: part for part in present if part % part_ids.SIDE_STEP >= part_ids.FIRST_MADE}
-    new = _successors(labels) | made
-    settings.keep_notes(
-        PartNotes(
-            {new[part]: name for part, name in notes.names.items() if part in new},
-            {new[part]: color for part, color in notes.colors.items() if part in new},
-            {new[part]: new[into] for part, into in notes.joined.items() if part in new and into in new},
-        )
-    )
-    for part in sorted(present - new.keys()):
-        new[part] = make_part(settings, style.name_of(part), part // part_ids.SIDE_STEP)
-    for mesh, parts in by_hand_on.items():
-        if (parts >= 0).any():
-            keep_by_hand(mesh, np.array([new.get(part, -1) for part in parts.tolist()]))
-
-
-def _successors(labels: Mapping[Character, IntArray]) -> dict[int, int]:
-    """Successor among new labels of each part that is on the meshes and has one."""
-    before, after, areas = [], [], []
-    for character, new in labels.items():
-        for obj, polygons in polygon_ranges(character):
-            old = model_labels(obj.data)
-            if old is not None:
-                before.append(old)
-                after.append(new[polygons])
-                areas.append(read_floats(obj.data.polygons, "area"))
-    if not before:
-        return {}
-    old_parts, row = np.unique(np.concatenate(before), return_inverse=True)
-    new_parts, column = np.unique(np.concatenate(after), return_inverse=True)
-    common = np.zeros((len(old_parts), len(new_parts)))
-    np.add.at(common, (row.ravel(), column.ravel()), np.concatenate(areas))
-    either = common.sum(axis=1, keepdims=True) + common.sum(axis=0) - common
-    rows, columns = np.nonzero(common > SUCCESSOR_OVERLAP * either)
-    return dict(zip(old_parts[rows].tolist(), new_parts[columns].tolist(), strict=True))
 
 
 @contextmanager

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from hashlib import blake2b
+from typing import Any, Literal
 
 import bpy
 
@@ -14,6 +15,10 @@ from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ...core.message import Message, message_of
 from ...core.progress import Progress
 from ..errors import UserError
+from ..outputs.origin import Origin, origin_of
+from ..parts import part_ids
+from ..parts.palette import MAX_COLORS
+from ..props.changes import unheard
 from ..props.settings import WKSSegmentSettings
 from ..scene import poses as reader
 from ..scene.change_guard import ChangeGuard
@@ -23,11 +28,14 @@ from ..scene.poses import Pose
 from ..scene.simulations import check_simulations
 from . import describing, model_library, pipeline
 from .describing import Run
+from .followed_settings import values_of
+from .model_ranking import NamedModel, fit_warning, models_of
 from .pipeline import LabelRequest
-from .report import Report, pose_warnings, segment_warnings, shape_warnings
+from .report import Report, absent_warnings, pose_warnings, segment_warnings, shape_warnings
 
 LEARN_SHARE = 0.97
 """Share of the progress of a job that learns before labeling: what takes long is known from learning."""
+OTHER_NUMBER = "This number of segments needs a new Learn and Segment: {reason}"
 SOFT_SHARE = 0.3
 """Share of soft weights in the progress of labeling."""
 
@@ -58,6 +66,14 @@ class SegmentationJob:
         Signatures computed earlier; new ones are added.
     described
         The described poses, once computed.
+    values
+        Values of the settings that labels follow, when the job was read.
+    uid : str
+        Identity of the model in the scene; empty as long as it has none.
+    name : str
+        Name by which meshes know the job.
+    compared
+        The applied model, and the others of the scene that might fit better.
     first : SegmentationJob, optional
         The job that this one repeats with other settings.
     labels
@@ -72,6 +88,10 @@ class SegmentationJob:
     learns: bool
     number: int | Literal["auto"]
     cache: Cache
+    values: dict[str, Any] = field(default_factory=dict)
+    uid: str = ""
+    name: str = ""
+    compared: list[NamedModel] = field(default_factory=list)
     described: list[Workpiece] = field(default_factory=list)
     first: SegmentationJob | None = None
     labels: dict[Character, IntArray] = field(default_factory=dict)
@@ -82,7 +102,8 @@ class SegmentationJob:
         """Read poses and settings to learn from; UserError if they cannot be used."""
         settings, report = context.scene.wks_segment, Report([])
         with report.stage("read"):
-            report.poses = read_training_poses(context, settings, report)
+            objects = without_transferred(selected_meshes(context), report)
+            report.poses = read_training_poses(context, settings, report, objects)
         asked = {"FRAMES": settings.pose_count - len(report.left_out), "MARKERS": 1}.get(settings.source)
         report.warn(*report.left_out, *pose_warnings(report.poses, asked))
         return cls._read(context, settings.new_model(), report, cache, learns=True)
@@ -90,9 +111,11 @@ class SegmentationJob:
     @classmethod
     def applying(
         cls, context: bpy.types.Context, cache: Cache, model: PoseSegmentation | None = None,
-        objects: Sequence[bpy.types.Object] = (),
+        objects: Sequence[bpy.types.Object] = (), uid: str = "",
     ) -> SegmentationJob:  # fmt: skip
         """Read objects to apply a model to: the selected ones and the model in use if none are given.
+
+        The model is applied with the number of segments in the settings; `uid` is its identity, if it is of the scene.
 
         Raises
         ------
@@ -100,10 +123,19 @@ class SegmentationJob:
             If they cannot be used.
         """
         settings, report = context.scene.wks_segment, Report([])
-        model = pipeline.stored_model(settings) if model is None else model
+        if model is None:
+            model, uid = pipeline.stored_model(settings), model_library.used_uid(settings)
         model.smoothness = settings.smoothness
+        number = settings.number()
+        if number not in ("auto", min(model.n_segments_, MAX_COLORS), model.n_segments):
+            try:
+                model = model.with_segments(number)
+            except ValueError as error:
+                report.warn(Message(OTHER_NUMBER, reason=message_of(error)))
+                with unheard():
+                    settings.n_segments = model.n_segments_
         with report.stage("read"):
-            chosen = mesh_objects(objects) if objects else selected_meshes(context)
+            chosen = mesh_objects(objects) if objects else without_transferred(selected_meshes(context), report)
             evaluated = evaluated_objects(context.view_layer)
             disabled = [obj.name for obj in chosen if obj not in evaluated]
             if disabled:
@@ -114,21 +146,41 @@ class SegmentationJob:
             characters = group(chosen, together=settings.one_character)
             check_simulations(context.scene, characters, over_time=False)
             report.poses = reader.read_objects(context, characters)
-        return cls._read(context, model, report, cache, learns=False)
+        job = cls._read(context, model, report, cache, False, uid)
+        return replace(job, compared=models_of(settings, uid))
 
     @classmethod
     def _read(
-        cls, context: bpy.types.Context, model: PoseSegmentation, report: Report, cache: Cache, learns: bool
-    ) -> SegmentationJob:
+        cls, context: bpy.types.Context, model: PoseSegmentation, report: Report, cache: Cache, learns: bool,
+        uid: str = "",
+    ) -> SegmentationJob:  # fmt: skip
         settings, poses = context.scene.wks_segment, report.poses
         report.warn(*shape_warnings(poses))
         with report.stage("read"):
             characters = [pose.character for pose in poses]
             request, guard = LabelRequest.of(settings, characters), ChangeGuard(context.scene, characters)
-        return cls(model, poses, request, guard, report, learns, settings.number(), cache)
+        job = cls(model, poses, request, guard, report, learns, settings.number(), cache, values_of(settings), uid)
+        return replace(job, name=job.identity())
 
-    def with_settings(self, settings: WKSSegmentSettings) -> SegmentationJob:
+    def identity(self) -> str:
+        """A hash of the model and the poses, the same whenever the same is done with the same meshes."""
+        model = repr(self.model) if self.learns else self.uid or self.model.to_json()
+        digest = blake2b(model.encode(), digest_size=8)
+        for pose in self.poses:
+            digest.update(repr((pose.name, [member.name for member in pose.character.members])).encode())
+            digest.update(pose.mesh.vertices.tobytes())
+        return digest.hexdigest()
+
+    def with_settings(
+        self, settings: WKSSegmentSettings, objects: Container[bpy.types.Object] | None = None
+    ) -> SegmentationJob:
         """The same poses and model with other settings, so that only labels need to be computed.
+
+        Parameters
+        ----------
+        settings
+        objects
+            Only characters with one of these objects are labeled; all of them if not given.
 
         Raises
         ------
@@ -147,12 +199,19 @@ class SegmentationJob:
                 with report.stage("regroup"):
                     model = model.with_segments(number, described, first.poses[0].upright)
             except ValueError as error:
-                raise UserError(
-                    "This number of segments needs a new Learn and Segment: {reason}", reason=message_of(error)
-                ) from error
+                raise UserError(OTHER_NUMBER, reason=message_of(error)) from error
+        chosen = [
+            i for i, pose in enumerate(first.poses)
+            if objects is None or any(obj in objects for obj in pose.character.objects)
+        ]  # fmt: skip
+        report.poses = [first.poses[i] for i in chosen]
         with report.stage("read"):
-            request = LabelRequest.of(settings, [pose.character for pose in first.poses])
-        return replace(first, model=model, request=request, report=report, first=first, labels={}, _weights=None)
+            request = LabelRequest.of(settings, [pose.character for pose in report.poses])
+        return replace(
+            first, model=model, poses=report.poses, request=request, report=report, first=first, labels={},
+            described=[first.described[i] for i in chosen] if first.described else [], values=values_of(settings),
+            uid=self.uid, _weights=None,
+        )  # fmt: skip
 
     def compute(self, progress: Progress) -> None:
         """Describe the poses, learn from them if asked to, and label them; UserError if the core refuses.
@@ -169,6 +228,17 @@ class SegmentationJob:
         self._weights = pipeline.soften(self.model, self.poses, self.described, self.labels, self.request, run)
         if self.learns:
             self.report.warnings += segment_warnings(self.model, self.report)
+        else:
+            self.report.warnings += absent_warnings(self.model, self.report)
+            if self.first is None:
+                self._compare()
+
+    def _compare(self) -> None:
+        """Warn of characters that the model does not fit."""
+        for pose, described in zip(self.poses, self.described, strict=True):
+            if self.compared:
+                warning = fit_warning(self.compared, [described.pose], pose.character.name)
+                self.report.warn(*([] if warning is None else [warning]))
 
     def _describe(self, progress: Progress) -> Progress:
         """Describe the poses, and learn from them if asked to; the progress of the rest."""
@@ -180,31 +250,37 @@ class SegmentationJob:
         self.described, rest = describing.describe_to_label(self.model, self.poses, run)
         return rest
 
-    def write(self, follows: bool = False) -> None:
-        """Write the labels, and the model if it was learned; ChangedError, and nothing written, if the scene changed.
-
-        Parameters
-        ----------
-        follows : bool
-            Whether the labels in the scene are from the same job, with other settings.
-        """
+    def write(self) -> None:
+        """Write the labels, and a learned model; ChangedError, and nothing written, if the scene changed."""
         self.guard.check_fully()
         settings = self.guard.scene().wks_segment
-        # With another number of segments, or another model, a part can get another number.
-        renumbered = self.learns or self.first is not None
-        # A row is added for a new job, and for a repeated one whose row was undone.
-        adds = self.learns and not (self.first is not None and follows) and not settings.replace_model
-        if adds:
-            # Names and colors belong to the other model, and are stored before they are carried over to this one.
-            model_library.store_active(settings)
-        pipeline.write_outputs(settings, self.labels, self.request, self.report, self._weights, renumbered)
-        if self.learns:
+        labels = self._keep_model(settings)
+        origin = Origin(labels, self.values, self.name)
+        pipeline.write_outputs(settings, self.labels, self.request, self.report, self._weights, origin)
+
+    def _keep_model(self, settings: WKSSegmentSettings) -> str:
+        """Keep the model in the scene; return the key of its label set."""
+        # A job that is repeated by Adjust Last Operation learns again, since its model was undone.
+        if self.learns and model_library.row_of(settings, self.uid) is None:
             names = list(dict.fromkeys(pose.character.name for pose in self.poses))
             first_names = ", ".join(names[:3])
             origin = Message("From {names}", names=first_names + " …" * (len(names) > 3))
             lines = [origin, *self.report.facts[:3], *self.report.choices]
-            model_library.keep(settings, self.model, lines, first_names, adds)
-        elif self.first is not None:
-            # The model is stored with this number of segments, so that applying it again gives the same ones.
-            lines = [model_library.summary_of(settings)[0], Message("{count} segments", count=self.model.n_segments_)]
-            model_library.keep(settings, self.model, lines)
+            members = [member.name for pose in self.poses for member in pose.character.members]
+            labels = model_library.learned(settings, copy(self.model), lines, members, first_names)
+            self.uid = part_ids.model_of(labels)
+            return labels
+        return model_library.adjusted(settings, self.uid, copy(self.model))
+
+
+def without_transferred(objects: Sequence[bpy.types.Object], report: Report) -> list[bpy.types.Object]:
+    """The objects without those that have another object's segments, if others are among them.
+
+    An outfit is no pose of the body whose segments it has. It is reported.
+    """
+    transferred = [obj for obj in objects if origin_of(obj.data).transferred]
+    if not transferred or len(transferred) == len(objects):
+        return list(objects)
+    names = quoted(obj.name for obj in transferred)
+    report.choices.append(Message("{names}: the transferred segments stay, Clear removes them", names=names))
+    return [obj for obj in objects if obj not in transferred]

@@ -24,11 +24,17 @@ def as_json(messages: Sequence[str]) -> str:
 
 def restored(text: str, stored: str) -> list[str]:
     """The messages that a text was stored with; its lines if there are none, or none that say the same."""
-    try:
-        messages = [_from_plain(fields) for fields in json.loads(stored or "[]")]
-    except (ValueError, LookupError, TypeError, AttributeError):
-        messages = []
+    messages = from_json(stored)
     return messages if messages and as_text(messages) == text else text.splitlines()
+
+
+def from_json(stored: object) -> list[str]:
+    """The messages in JSON, none if it is damaged: model files come from anywhere."""
+    try:
+        messages = [_from_plain(fields) for fields in json.loads(str(stored))]
+    except (ValueError, LookupError, TypeError, AttributeError):
+        return []
+    return messages if all(isinstance(message, str) for message in messages) else []
 
 
 def _as_plain(value: object) -> Any:

@@ -51,8 +51,8 @@ FIRST = 100.0
 """Taken from the loss of small kinds: more than any."""
 DOUBT, SIZE = 4.0, 0.75
 """A merge of kinds with log-odds o, of which the smaller one has the area a, is taken to lose `a ** SIZE * tanh(-o / 2
-/ DOUBT)`: what is mixed if they are two parts, less what is made whole if they are one. What loses least comes first, so
-fingers are merged before limbs."""
+/ DOUBT)`: what is mixed if they are two parts, less what is made whole if they are one. What loses least comes first,
+so fingers are merged before limbs."""
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,8 @@ PROGRESS_SECONDS = 0.1
 """Seconds between two reports of progress, and so the longest time until a job notices that it is canceled."""
 BESIDE_EIGENPAIRS = 1.5
 """Time of a whole job as a multiple of the time of its eigenpairs, about."""
+SIGNATURE_BYTES = 16
+"""Bytes of a number of a signature while it is computed and standardized: it is there twice."""
 
 SURFACE = 0.06
 """Share of the time of a pose after which its surface is prepared."""
@@ -224,7 +226,11 @@ class PoseDescriber:
         addition.
         """
         seconds = sum(seconds_needed(self._n_refined(mesh), self.n_eigenpairs, self.accuracy) for mesh in meshes)
-        needed = sorted(memory_needed(self._n_refined(mesh), self.n_eigenpairs, self.accuracy) for mesh in meshes)
+        needed = sorted(
+            memory_needed(self._n_refined(mesh), self.n_eigenpairs, self.accuracy)
+            + SIGNATURE_BYTES * self._n_refined(mesh) * self.n_energies
+            for mesh in meshes
+        )
         return BESIDE_EIGENPAIRS * seconds, sum(needed[-self._workers(meshes) :])
 
     def _described(self, mesh: AnyPose) -> Workpiece:

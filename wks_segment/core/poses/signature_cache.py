@@ -8,20 +8,22 @@ from __future__ import annotations
 
 import hashlib
 import os
+import struct
 import threading
 import time
-import uuid
 import zipfile
 import zlib
 from collections import OrderedDict
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
+from stat import S_ISREG
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..files.whole_file import UNFINISHED_PREFIX, whole_file
 from ..mesh.surface import Connection
 from ..mesh.triangle_mesh import TriangleMesh
 from .pose_signature import PoseSignature
@@ -32,10 +34,17 @@ MEMORY = 1_000_000_000
 """Default limit of a cache in memory, in bytes: about 100 poses of 10,000 vertices."""
 DISK = 10_000_000_000
 """Default limit of a cache on disk, in bytes."""
-CACHE_SUFFIX, UNFINISHED_SUFFIX = ".npz", ".part"
+CACHE_SUFFIX = ".npz"
+DIGEST = "digest"
+"""Array of a file with the digest of its key and of all other arrays."""
 ABANDONED = 3600.0
 """An unfinished file that is older than this, in seconds, was left by a process that has died: writing one takes
 seconds."""
+DAMAGES = (
+    OSError, ValueError, KeyError, EOFError, MemoryError, RuntimeError, TypeError, SyntaxError, zipfile.BadZipFile,
+    zlib.error, struct.error,
+)  # fmt: skip
+"""What NumPy raises for a file that is damaged, in its archive or in the header of an array."""
 
 
 class SignatureCache(Protocol):
@@ -153,8 +162,9 @@ class MemoryCache:
 class DiskCache:
     """Cache in the files of a folder; the least recently used files are removed first.
 
-    Several processes and users may use the folder at once: a file appears as a whole or not at all, a damaged file
-    counts as missing, and a file can be read by all who can read other new files of its user (`umask`).
+    Several processes and users may use the folder at once: a file appears as a whole or not at all, and can be read by
+    all who can read other new files of its user (`umask`). A file is used only if it has the digest of its key and its
+    arrays: one that is damaged, altered or renamed counts as missing and is replaced.
 
     Parameters
     ----------
@@ -171,11 +181,8 @@ class DiskCache:
 
     def get(self, key: str) -> PoseSignature | None:
         """See `SignatureCache`."""
-        try:
-            arrays = self.arrays(key)
-            return None if arrays is None else PoseSignature.of_arrays(arrays)
-        except (ValueError, KeyError):
-            return None
+        arrays = self.arrays(key)
+        return None if arrays is None else PoseSignature.of_arrays(arrays)
 
     def put(self, key: str, signature: PoseSignature) -> None:
         """See `SignatureCache`; OSError if the file cannot be written."""
@@ -184,10 +191,15 @@ class DiskCache:
     def arrays(self, key: str) -> Mapping[str, NDArray[Any]] | None:
         """See `Cache`."""
         path = self._path(key)
+        if not path.is_file():  # a pipe would be read forever
+            return None
         try:
             with np.load(path, allow_pickle=False) as file:
                 arrays = dict(file)
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
+            digest = str(arrays.pop(DIGEST))
+        except DAMAGES:
+            return None
+        if digest != content_key(key, arrays):
             return None
         with suppress(OSError):  # the file of another user can be read, but not marked as used
             os.utime(path)
@@ -195,19 +207,14 @@ class DiskCache:
 
     def keep(self, key: str, arrays: Mapping[str, NDArray[Any]]) -> None:
         """See `Cache`; OSError if the file cannot be written."""
-        # Not by `tempfile`, whose files can be read by one user alone.
-        unfinished = self.folder / f"{uuid.uuid4().hex}{UNFINISHED_SUFFIX}"
-        with unfinished.open("xb") as file:
-            try:
-                np.savez(file, **arrays)
-            except BaseException:
-                file.close()
-                unfinished.unlink()
-                raise
+        path = self._path(key)
         try:
-            unfinished.replace(self._path(key))
-        except PermissionError:  # it exists, and another user's is protected, or on Windows another process reads it
-            unfinished.unlink()
+            with whole_file(path) as unfinished:
+                np.savez(unfinished, **arrays, **{DIGEST: np.array(content_key(key, arrays))})
+        except (PermissionError, IsADirectoryError):
+            # Something is there that is another user's, or a folder, or on Windows read by another process.
+            if not path.exists():
+                raise
         self._remove_old_files()
 
     def _path(self, key: str) -> Path:
@@ -219,10 +226,11 @@ class DiskCache:
         for path in self.folder.iterdir():
             with suppress(FileNotFoundError, PermissionError):
                 state = path.stat()
-                if path.suffix == CACHE_SUFFIX:
+                if path.name.startswith(UNFINISHED_PREFIX):
+                    if state.st_mtime < time.time() - ABANDONED:
+                        path.unlink()
+                elif path.suffix == CACHE_SUFFIX and S_ISREG(state.st_mode):
                     files.append((state.st_mtime_ns, state.st_size, path))
-                elif path.suffix == UNFINISHED_SUFFIX and state.st_mtime < time.time() - ABANDONED:
-                    path.unlink()
         total = sum(size for _, size, _ in files)
         for _, size, path in sorted(files):
             if total <= self.limit:

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
 from typing import Any
 
 from ....core import MemoryCache, Ranking
 from ....core.progress import Progress
 from ...errors import UserError
-from ...scene import file_formats
+from ...scene import file_content, file_formats
 from ...scene.poses import Pose
 from ...workflow import describing, model_library, pipeline
 from ...workflow.describing import Run
-from ...workflow.model_ranking import NamedModel, largest, rank_poses, verdict_message
-from ...workflow.report import Report
+from ...workflow.model_ranking import NamedModel, fit_warning, largest, rank_poses, verdict_message
+from ...workflow.report import Report, absent_warnings
 from ..command_options import (
     add_labeling_settings,
     add_model,
@@ -50,7 +51,7 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     run = Run(Report([]), progress, cache_from(options), options.threads)
     verdict = {}
     if options.models is None:
-        chosen = NamedModel(options.model.stem, model_library.loaded(options.model))
+        chosen = NamedModel(file_content.name_of(options.model), model_library.loaded(options.model))
         poses = read_poses(options, run.report, single=False)
     else:
         models = read_models(options.models, run.report)
@@ -64,12 +65,19 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     model = chosen.model
     run.report.add_model(model)
     settings = settings_from(options)
-    model_library.add_model(settings, model, chosen.name, [f"From {chosen.name}", f"{model.n_segments_} segments"])
+    model_library.add_model(
+        settings, copy(model), chosen.name, [f"From {chosen.name}", f"{model.n_segments_} segments"]
+    )
     if options.smoothness is not None:
         model.smoothness = settings.smoothness
     pipeline.check_limits(model, poses, settings)
     described, rest = describing.describe_to_label(model, poses, run)
     label_and_write(model, poses, described, settings, options, run.with_progress(rest))
+    if options.models is None:
+        for pose, signature in zip(poses, described, strict=True):
+            warning = fit_warning([chosen], [signature.pose], pose.character.name)
+            run.report.warn(*([] if warning is None else [warning]))
+    run.report.warn(*absent_warnings(model, run.report))
     if options.output:
         file_formats.save_scene(options.output)
     return result_of(options, run.report) | verdict

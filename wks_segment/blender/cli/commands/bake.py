@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from copy import copy
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from ....core.progress import Progress
 from ...errors import UserError
 from ...outputs.bake import BakeOptions, bake_id_maps
 from ...outputs.id_map import save_image
+from ...outputs.origin import Origin
 from ...outputs.part_attributes import labels_on
 from ...props.settings import WKSSegmentSettings
 from ...scene import file_formats
@@ -21,9 +23,11 @@ from ...scene.characters import Character
 from ...scene.poses import Pose
 from ...workflow import describing, model_library, pipeline
 from ...workflow.describing import Run
+from ...workflow.followed_settings import values_of
 from ...workflow.pipeline import LabelRequest
 from ...workflow.report import Report
 from ..command_options import BAKE_OPTIONS, add_labeling_settings, add_object, add_settings, settings_from
+from ..option_types import named_path
 from ..reading import read_poses
 from ..results import check_picture, result_of
 
@@ -31,17 +35,17 @@ from ..results import check_picture, result_of
 def add(commands: Any) -> None:
     """Add the command to the subparsers of the command line."""
     bake = commands.add_parser("bake", help="bake the parts in a file, or those that a model finds, to an ID map")
-    bake.add_argument("files", type=Path, nargs=1, metavar="FILE", help=", ".join(file_formats.IMPORTERS))
+    bake.add_argument("files", type=named_path, nargs=1, metavar="FILE", help=", ".join(file_formats.IMPORTERS))
     bake.add_argument(
-        "--output", type=Path, required=True, metavar="PNG",
+        "--output", type=named_path, required=True, metavar="PNG",
         help="write the image to this file; if there are several, each to a file with the name of its object",
     )  # fmt: skip
-    bake.add_argument("--model", type=Path, help="find the parts with this model, even if the file has parts")
+    bake.add_argument("--model", type=named_path, help="find the parts with this model, even if the file has parts")
     add_object(bake)
     bake.add_argument(
         "--unwrap", action="store_true", help="unwrap objects without a UV map by Smart UV Project; see --blend"
     )
-    bake.add_argument("--blend", type=Path, help="also write the scene to this file, with UV maps and images")
+    bake.add_argument("--blend", type=named_path, help="also write the scene to this file, with UV maps and images")
     add_labeling_settings(bake)
     add_settings(bake, BAKE_OPTIONS)
     bake.set_defaults(run=_bake, action=None, frames=None, shape_keys=None, markers=None, actions=None)
@@ -79,13 +83,16 @@ def _label(
             "{path}: there are no segments in it: give a model to find them with --model", path=options.files[0]
         )
     model = model_library.loaded(options.model) if options.model else pipeline.stored_model(settings)
+    if options.model:
+        model_library.add_model(settings, copy(model), options.model.stem, [f"From {options.model.name}"])
     if options.smoothness is not None:
         model.smoothness = settings.smoothness
     pipeline.check_limits(model, poses, settings)
     described = describing.describe(model, poses, run)
     request = LabelRequest.of(settings, characters)
     labels = pipeline.label(model, poses, described, request, run)
-    pipeline.write_outputs(settings, labels, request, run.report)
+    origin = Origin(settings.labels(), values_of(settings))
+    pipeline.write_outputs(settings, labels, request, run.report, origin=origin)
 
 
 def _bake_images(
@@ -93,7 +100,7 @@ def _bake_images(
 ) -> dict[str, Path]:
     """Bake an ID map for each image of the characters; name and file of each."""
     files: dict[str, Path] = {}
-    bake_options = BakeOptions(settings.bake_size, settings.bake_margin, options.unwrap, settings.style())
+    bake_options = BakeOptions(settings.bake_size, settings.bake_margin, options.unwrap)
     with run.report.stage("bake"):
         id_maps = [
             id_map

@@ -37,7 +37,7 @@ from ..command_options import (
     add_settings,
     to_arguments,
 )
-from ..option_types import batch_part, number_within
+from ..option_types import batch_part, named, named_path, number_within
 
 TIME_LIMIT = 3600.0
 """Default of the seconds that a file may take."""
@@ -84,12 +84,12 @@ def add(commands: Any) -> None:
     apply.set_defaults(run=_run, template_of=_apply_template)
     rank = kinds.add_parser("rank", help="find which of several models fits each file")
     _add_batch_options(rank)
-    rank.add_argument("--models", type=Path, required=True, metavar="DIR", help="folder of the models to compare")
+    rank.add_argument("--models", type=named_path, required=True, metavar="DIR", help="folder of the models to compare")
     add_pose_sources(rank)
     add_settings(rank)
     rank.set_defaults(run=_run, template_of=_rank_template)
     report = kinds.add_parser("report", help="merge the lists of all parts of a batch, and write its report")
-    report.add_argument("--output", type=Path, required=True, metavar="DIR", help="the folder of the batch")
+    report.add_argument("--output", type=named_path, required=True, metavar="DIR", help="the folder of the batch")
     report.set_defaults(run=_report)
     for kind in kinds.choices.values():
         kind.add_argument("--json", action="store_true", default=argparse.SUPPRESS, help="print one JSON object")
@@ -109,11 +109,15 @@ def child_program() -> Program:
 
 def _add_batch_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "inputs", nargs="+", metavar="INPUT",
+        "inputs", nargs="+", type=named, metavar="INPUT",
         help=f"files, folders, or patterns such as 'in/**/*.glb': {', '.join(file_formats.IMPORTERS)}",
     )  # fmt: skip
     parser.add_argument(
-        "--output", type=Path, required=True, metavar="DIR", help="folder for the results, their list and a report"
+        "--output",
+        type=named_path,
+        required=True,
+        metavar="DIR",
+        help="folder for the results, their list and a report",
     )
     cores = os.cpu_count() or 1
     parser.add_argument(

@@ -22,14 +22,15 @@ from ...workflow.report import Report
 from ..command_options import OUTPUT_OPTIONS, SEGMENTATION_OPTIONS, add_object, add_settings, settings_from
 from ..demo_scene import Demo, creature_in
 from ..file_characters import characters_in, set_action
+from ..option_types import named_path
 from ..reading import choice_of
 
 
 def add(commands: Any) -> None:
     """Add the command to the subparsers of the command line."""
     demo = commands.add_parser("demo", help="build a creature, learn from some poses, and check on others")
-    demo.add_argument("--input", type=Path, help="an animated file to use instead of the creature")
-    demo.add_argument("--folder", type=Path, default=Path("demo"), help="folder for the results (default: demo)")
+    demo.add_argument("--input", type=named_path, help="an animated file to use instead of the creature")
+    demo.add_argument("--folder", type=named_path, default=Path("demo"), help="folder for the results (default: demo)")
     demo.add_argument("--learn", type=int, default=4, help="number of poses to learn from (default: 4)")
     demo.add_argument("--unseen", type=int, default=4, help="number of poses to check on (default: 4)")
     demo.add_argument("--action", help="name of the action to take the poses from")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from ....core import Ranking
@@ -16,7 +15,7 @@ from ...workflow.model_ranking import NamedModel, largest, rank_poses, verdict_m
 from ...workflow.report import Report
 from ...workflow.retrieval import evaluate
 from ..command_options import add_poses, add_resources, add_settings, cache_from, settings_from
-from ..option_types import number_within
+from ..option_types import named_path, number_within
 from ..reading import read_models, read_poses
 from ..results import check_picture, rounded_seconds, warnings_and_files
 from ..terminal import table
@@ -31,9 +30,9 @@ def add(commands: Any) -> None:
     """Add the command to the subparsers of the command line."""
     rank = commands.add_parser("rank", help="find which of several models fits a file, or how often that is right")
     add_poses(rank, nargs="*")
-    rank.add_argument("--models", type=Path, metavar="DIR", help="folder of the models to compare (.json)")
+    rank.add_argument("--models", type=named_path, metavar="DIR", help="folder of the models to compare (.json)")
     rank.add_argument(
-        "--evaluate", type=Path, metavar="DIR",
+        "--evaluate", type=named_path, metavar="DIR",
         help="learn a model of each class in this folder, and find the class of all other shapes in it; a class is a "
         "sub-folder with one shape in each file, or an animated file, of which --frames COUNT frames are the shapes",
     )  # fmt: skip
@@ -42,7 +41,7 @@ def add(commands: Any) -> None:
         help=f"with --evaluate, number of shapes of each class to learn (default: {LEARNED_SHAPES})",
     )  # fmt: skip
     rank.add_argument(
-        "--picture", type=Path, metavar="PNG", help="with --evaluate, write a picture of the confusion matrix"
+        "--picture", type=named_path, metavar="PNG", help="with --evaluate, write a picture of the confusion matrix"
     )
     add_settings(rank)
     add_resources(rank)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+from copy import copy
 from typing import Any
 
 from ....core.progress import Progress
@@ -13,6 +13,7 @@ from ...workflow.describing import Run
 from ...workflow.report import Report, pose_warnings, segment_warnings
 from ...workflow.segmentation_job import LEARN_SHARE
 from ..command_options import add_outputs, add_poses, add_resources, add_settings, cache_from, settings_from
+from ..option_types import named_path
 from ..reading import read_poses, warn_at_once
 from ..results import check_outputs, label_and_write, result_of, save_model
 
@@ -22,14 +23,14 @@ def add(commands: Any) -> None:
     segment = commands.add_parser("segment", help="learn parts from the poses in files, and write them")
     add_poses(segment)
     add_settings(segment)
-    segment.add_argument("--model", type=Path, help="write the model to this file")
+    segment.add_argument("--model", type=named_path, help="write the model to this file")
     add_outputs(segment)
     add_resources(segment)
     segment.set_defaults(run=_segment)
     learn = commands.add_parser("learn", help="learn a model from the poses in files")
     add_poses(learn)
     add_settings(learn)
-    learn.add_argument("--model", type=Path, required=True, help="write the model to this file")
+    learn.add_argument("--model", type=named_path, required=True, help="write the model to this file")
     add_resources(learn)
     learn.set_defaults(run=_segment, output=None, render=None)
 
@@ -49,12 +50,12 @@ def _segment(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
     described = pipeline.learn(model, poses, run.with_progress(run.progress.part(0.0, LEARN_SHARE)))
     if options.model:
         save_model(model, options.model)
-    model_library.store_active(settings)
+    names = [member.name for pose in poses for member in pose.character.members]
+    model_library.learned(settings, copy(model), run.report.facts, names, poses[0].character.name)
     if options.output or options.render:
         rest = run.with_progress(run.progress.part(LEARN_SHARE, 1.0))
-        label_and_write(model, poses, described, settings, options, rest, renumbered=True)
+        label_and_write(model, poses, described, settings, options, rest)
         run.report.warnings += segment_warnings(model, run.report)
-    model_library.keep(settings, model, run.report.facts, poses[0].character.name, add=True)
     if options.output:
         file_formats.save_scene(options.output)
     return result_of(options, run.report)
