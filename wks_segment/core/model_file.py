@@ -231,7 +231,7 @@ def _fields(
             Field("natural", (), 1, k, whole=True),
         )
         if "areas" in content:
-            yield _Field("areas", (k,), least=0.0, most=1.0)
+            yield Field("areas", (k,), least=0.0, most=1.0)
         if "kind_mean" in content:
             yield from (
                 Field("kind_mean", (n_kinds,)),

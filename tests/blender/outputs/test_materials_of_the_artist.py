@@ -117,13 +117,13 @@ def test_a_new_name_and_color_of_a_segment_leave_what_the_artist_chose(obj, sett
 
 
 def test_new_labels_use_the_changed_material(obj, settings):
-    material = bpy.data.materials[NAME]
+    material = bpy.data.materials["Segment 1"]
     new_node(material)
     material.name = "Hero Skin"
     for step in (STEPS["apply"], STEPS["live"]):
         step(settings)
         assert material in list(obj.data.materials)
-        assert NAME not in bpy.data.materials
+        assert "Segment 1" not in bpy.data.materials
 
 
 def test_clear_names_what_it_keeps(obj, printed):

@@ -95,7 +95,7 @@ def test_smoothness_smooths_the_soft_weights(settings):
             plain = model.predict_proba(signature)
             np.testing.assert_allclose(weights[plain >= 0.99], plain[plain >= 0.99], atol=0.011)
             np.testing.assert_array_equal(weights > 0, plain >= LEAST_WEIGHT)
-    assert steps[0] > 1.1 * steps[1] > 1.1 * 1.1 * steps[2]
+    assert steps[0] > steps[1] > 1.1 * steps[2]
 
 
 def test_apply_writes_soft_groups_to_an_unseen_pose(settings):

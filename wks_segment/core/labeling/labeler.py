@@ -151,8 +151,11 @@ class Labeler:
         ValueError
             If `rest` has other faces than the first pose.
         """
-        assert self.grouping is not None
-        numbers = self.grouping.number_of_wholes(self.n_segments), self.n_segments
+        grouping = self.grouping
+        assert grouping is not None
+        # Own parts of a body are whole as they are: what they have in common is for segments only.
+        n_wholes = grouping.number_of_wholes(self.n_segments) if self.traits is None else grouping.n_kinds
+        numbers = n_wholes, self.n_segments
         atlases = {atlas.n_groups: atlas for atlas in known}
         for n_groups, step in progress.each(sorted(set(numbers) - atlases.keys())):
             atlases[n_groups] = self._atlas(n_groups, poses, rest, step)
@@ -241,7 +244,7 @@ class Labeler:
         if grouping is None or grouping.areas is None or self.traits is not None or self.length == 0:
             return posteriors
         n_groups = posteriors.shape[1]
-        shares = np.bincount(grouping.groups(n_groups), grouping.areas, n_groups)
+        shares = np.bincount(grouping.groups(n_groups), grouping.areas, n_groups).astype(np.float64)
         return with_learned_areas(posteriors, mesh.areas, shares)
 
     def _symmetric(self, mesh: PolygonMesh, posteriors: FloatArray) -> FloatArray:
