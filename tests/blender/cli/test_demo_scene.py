@@ -52,7 +52,7 @@ def test_demo_of_a_small_character(settings, tmp_path, needs_rendering):
     assert result["agreement"] > 0.9
     assert result["agreement"] == pytest.approx(np.mean([pose["agreement"] for pose in result["poses"][1:3]]), abs=1e-3)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["walk.1.blend", "walk.1.json", "walk.1.png"]
-    assert shares == sorted(shares)
+    assert (np.diff(shares) > -1e-9).all(), "it falls by more than rounding"
     assert 0 <= shares[0] < shares[-1] <= 1
 
 
