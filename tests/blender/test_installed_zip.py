@@ -242,6 +242,8 @@ def use_extension(site, zip_path, profile):
 
     bpy.context.preferences.addons[module].preferences.model_folder = profile
     assert bpy.ops.wks_segment.save_model(filepath=str(Path(profile) / "shared.json")) == {"FINISHED"}
+    settings.n_eigenpairs = 50  # copies of one model are counted once
+    assert bpy.ops.wks_segment.learn() == {"FINISHED"}
     assert bpy.ops.wks_segment.rank() == {"FINISHED"}
     assert "shared" in [item.name for item in settings.ranking], "the model folder of the preferences is not used"
 
