@@ -110,7 +110,7 @@ def test_a_damaged_model_is_refused_with_the_reason(text, change, message):
         (lambda c: c["weights"].__setitem__(0, str(c["weights"][0])), "weights is missing or not numbers"),
         (lambda c: c["means"][0].__setitem__(0, 1e5 * c["means"][0][0]), "means has a number that is far too large"),
         (lambda c: c["certainties"].__setitem__(0, -0.5), "certainties has a negative number"),
-        (lambda c: c["region_distance"][0].__setitem__(0, -1e-3), "region_distance has a negative number"),
+        (lambda c: c["region_distance"][0].__setitem__(0, -1.0), "region_distance has a negative number"),
         (lambda c: c["region_area"].__setitem__(0, 2.0), "region_area has a number of 2, too large"),
         (lambda c: c.update(version="5\x1b[31m" + "x" * 1000), r"version '5\\x1b\[31mx{5,50}…?"),
         (lambda c: c["parameters"].update(accuracy="\n" * 300), r"accuracy cannot be '(\\n)+"),

@@ -25,7 +25,7 @@ from .files.checked_json import (
 )
 from .files.whole_file import write_whole
 from .labeling.region_atlas import RegionAtlas
-from .labeling.traits import FIELDS, PLANES
+from .labeling.traits import FIELDS, PLANES, SURROUNDINGS
 from .learning.gaussian_mixture import CovarianceType, GaussianMixture
 from .learning.merge_tree import MOST_SEGMENTS, MergeTree
 from .learning.parameters import PARAMETERS, check_parameters, effective
@@ -247,7 +247,8 @@ def _fields(
             Field(f"{kind}_area", (r,), POSITIVE, WHOLE_SHARE),
             Field(f"{kind}_signature", (r, FIELDS)),
             Field(f"{kind}_handedness", (r, PLANES)),
-            Field(f"{kind}_distance", (r, r), least=0.0),
+            # Files of earlier versions have distances that are a little negative.
+            Field(f"{kind}_distance", (r, r), least=-SURROUNDINGS),
             Field(f"{kind}_noise", (4,), least=POSITIVE),
         )
 

@@ -86,7 +86,7 @@ def read_array(content: dict[str, Any], field: Field) -> NDArray[np.float64]:
         )  # fmt: skip
     if field.least > 0 and value < field.least:
         raise DamagedError(Message("{name} has a number that is not positive, or far too small", name=name))
-    if field.least == 0 and value < 0:
+    if field.least <= 0 and value < field.least:
         raise DamagedError(Message("{name} has a negative number", name=name))
     raise DamagedError(Message("{name} has a number of {value:.3g}, too large", name=name, value=value))
 

@@ -245,7 +245,7 @@ class Labeler:
             return posteriors
         n_groups = posteriors.shape[1]
         shares = np.bincount(grouping.groups(n_groups), grouping.areas, n_groups).astype(np.float64)
-        return with_learned_areas(posteriors, mesh.areas, shares)
+        return with_learned_areas(posteriors, mesh.sound_areas, shares)
 
     def _symmetric(self, mesh: PolygonMesh, posteriors: FloatArray) -> FloatArray:
         """Posteriors of polygons, the same on both sides of a symmetric mesh; as they are without smoothing."""

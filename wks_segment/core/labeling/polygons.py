@@ -57,6 +57,8 @@ class PolygonMesh:
     ----------
     areas : (p,) array
         Mean over the poses that show the polygon, as shares of the whole.
+    sound_areas : (p,) array
+        The same on the repaired surfaces, without spikes.
     neighbors : FaceAdjacency
         Of the polygons.
     """
@@ -65,11 +67,12 @@ class PolygonMesh:
         if polygons is None:
             polygons = [np.arange(pose.surface.original.n_faces) for pose in poses]
         n_polygons = 1 + max(int(polygon_of.max()) for polygon_of in polygons)
-        self.areas, times_seen = np.zeros(n_polygons), np.zeros(n_polygons)
+        self.areas, self.sound_areas, times_seen = np.zeros((3, n_polygons))
         in_poses = []
         for pose, polygon_of in zip(poses, polygons, strict=True):
             in_pose = _PolygonsInPose.of(pose, polygon_of, n_polygons)
             self.areas += in_pose.areas
+            self.sound_areas += in_pose.sound_areas
             times_seen += in_pose.seen
             in_poses.append(in_pose)
         self._in_poses, self._times_seen = in_poses, times_seen
@@ -79,6 +82,7 @@ class PolygonMesh:
         mean_centers = sum(in_pose.centers for in_pose in in_poses) / np.maximum(times_seen, 1)[:, None]
         self._centers = np.where(fullest.seen[:, None], fullest.centers, mean_centers)
         self.areas /= np.maximum(times_seen, 1)
+        self.sound_areas /= np.maximum(times_seen, 1)
         self._mirror = fullest.mirror
         self.neighbors = fullest.neighbors
 
@@ -157,7 +161,8 @@ class _PolygonsInPose:
     ----------
     seen : (p,) bool array
         Whether the polygon has a triangle.
-    areas : (p,) array
+    areas, sound_areas : (p,) arrays
+        On the original mesh, and on the repaired surface.
     centers : (p, 3) array
         0 where not seen.
     mean : (p, m) sparse array
@@ -172,6 +177,7 @@ class _PolygonsInPose:
 
     seen: BoolArray
     areas: FloatArray
+    sound_areas: FloatArray
     centers: FloatArray
     mean: csr_matrix
     across: BoolArray
@@ -181,17 +187,20 @@ class _PolygonsInPose:
     @classmethod
     def of(cls, pose: Workpiece, polygon_of: IntArray, n_polygons: int) -> _PolygonsInPose:
         """Polygons of a pose, given the polygon of each triangle."""
-        original = pose.surface.original
+        surface, original = pose.surface, pose.surface.original
         sum_over = indicator(np.where(polygon_of < 0, n_polygons, polygon_of), n_polygons + 1)[:n_polygons]
         # A triangle without area has a tiny weight, or a polygon of such triangles would have no label.
         weight = original.face_areas / original.area + np.finfo(float).eps
         total = sum_over @ weight
         seen = np.asarray(total > 0)
         mean = csr_matrix(diags(1 / np.where(seen, total, 1)) @ sum_over @ diags(weight))
-        centers, mirror = original.unit_face_centers, pose.surface.mirror
+        centers, mirror = original.unit_face_centers, surface.mirror
+        own = surface.face_of >= 0
+        sound = np.bincount(surface.face_of[own], surface.mesh.face_areas[own] / surface.mesh.area, original.n_faces)
         return cls(
             seen,
             total * seen,
+            np.asarray(sum_over @ sound),
             np.asarray(mean @ centers),
             mean,
             pose.neighbors.across(polygon_of),

@@ -141,7 +141,8 @@ class Traits:
         overlap = heat.T @ (heat * masses[:, None]) / masses.sum()
         size = np.sqrt(np.maximum(area, LEAST_OVERLAP))
         distance = -SURROUNDINGS * np.log(np.maximum(overlap / np.outer(size, size), LEAST_OVERLAP))
-        return cls(segment, np.maximum(area, LEAST_OVERLAP), signature, handedness, distance)
+        # Rounding may let a small region overlap itself by more than its area.
+        return cls(segment, np.maximum(area, LEAST_OVERLAP), signature, handedness, np.maximum(distance, 0))
 
 
 def mean_traits(poses: Sequence[Traits]) -> Traits:
