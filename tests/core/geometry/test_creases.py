@@ -5,14 +5,14 @@ from shapes import icosphere, together
 from wks_segment.core import TriangleMesh, prepare_surface
 from wks_segment.core.geometry.creases import (
     FINE,
-    border_weights,
+    Normals,
+    border_shape,
     curvature_across,
     log_thickness,
     outward_signs,
-    smooth_normals,
-    vertex_normals,
+    weights_of_borders,
 )
-from wks_segment.core.geometry.heat_flow import Flows, HeatFlow
+from wks_segment.core.geometry.heat_flow import Flows
 from wks_segment.core.mesh.adjacency import FaceAdjacency
 
 AREA_OF_UNIT_SPHERE = 4 * np.pi
@@ -38,9 +38,10 @@ def test_outward_signs_do_not_depend_on_the_orientation_of_faces():
 def test_thickness_and_curvature_of_a_sphere(turned):
     sphere = icosphere(4)
     surface = prepare_surface(TriangleMesh(sphere.vertices, sphere.faces[:, ::-1]) if turned else sphere)
-    normals = smooth_normals(vertex_normals(surface), HeatFlow(surface.mesh, FINE))
+    flows = Flows(surface.mesh)
+    normals = Normals(surface, flows).over(FINE)
     radius = 1 / np.sqrt(AREA_OF_UNIT_SPHERE)
-    np.testing.assert_allclose(np.exp(log_thickness(surface, normals, Flows(surface.mesh))) - 0.003, radius, rtol=0.05)
+    np.testing.assert_allclose(np.exp(log_thickness(surface, normals, flows)) - 0.003, radius, rtol=0.05)
     np.testing.assert_allclose(curvature_across(surface, normals, adjacency_of(surface)), 1 / radius, rtol=0.15)
 
 
@@ -48,8 +49,9 @@ def test_a_sheet_is_thin_on_a_coarse_mesh():
     sphere = icosphere(3)
     sheet = TriangleMesh(sphere.vertices * (1, 1, 0.02), sphere.faces)
     surface = prepare_surface(sheet)
-    normals = smooth_normals(vertex_normals(surface), HeatFlow(surface.mesh, FINE))
-    thickness = np.exp(log_thickness(surface, normals, Flows(surface.mesh))) - 0.003
+    flows = Flows(surface.mesh)
+    normals = Normals(surface, flows).over(FINE)
+    thickness = np.exp(log_thickness(surface, normals, flows)) - 0.003
     middle = np.hypot(*sheet.vertices[:, :2].T) < 0.6
     assert np.median(thickness[middle]) * np.sqrt(sheet.area) < 0.03
 
@@ -64,7 +66,9 @@ def test_border_weights_are_least_in_a_crease():
     )
     surface = prepare_surface(waist)
     adjacency = adjacency_of(surface)
-    weights, _ = border_weights(surface, adjacency)
+    flows = Flows(surface.mesh)
+    shape = border_shape(surface, adjacency, flows, Normals(surface, flows))
+    weights = weights_of_borders(adjacency.pairs, waist.unit_face_centers, shape.coarse, shape.thickness)
     place = np.abs(waist.face_centers[adjacency.pairs].mean(axis=1)[:, 0])
     assert (weights > 0).all()
     assert np.median(weights[place < 0.3]) < 0.5 * np.median(weights[place > 1.0])

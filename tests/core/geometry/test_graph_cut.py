@@ -5,7 +5,7 @@ import pytest
 from shapes import creature, grid, icosphere, together
 
 from wks_segment.core import TriangleMesh, prepare_surface
-from wks_segment.core.geometry.creases import coarse_curvature
+from wks_segment.core.geometry.creases import COARSE, Normals, curvature_across
 from wks_segment.core.geometry.graph_cut import CutStyle, Energy, cut_borders, expansion, minimize_energy
 from wks_segment.core.geometry.heat_flow import Flows
 from wks_segment.core.mesh.adjacency import FaceAdjacency, FaceGraph
@@ -115,7 +115,8 @@ def test_a_border_snaps_to_a_nearby_crease():
     waist = 1 - 0.1 * np.exp(-((x / 0.1) ** 2))
     mesh = TriangleMesh(sphere.vertices * np.stack([np.ones_like(x), waist, waist], axis=1), sphere.faces)
     surface = prepare_surface(mesh)
-    curvature = coarse_curvature(surface, adjacency_of(mesh), Flows(surface.mesh))
+    normals = Normals(surface, Flows(surface.mesh)).over(COARSE)
+    curvature = curvature_across(surface, normals, adjacency_of(mesh))
     weights = CutStyle(LENGTH).border_weights(curvature)
     across = at_line(mesh, 0.0)
     assert weights[across].max() < 0.6

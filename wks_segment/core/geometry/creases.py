@@ -8,6 +8,7 @@ Cohen-Or 2008).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -16,7 +17,7 @@ from ..mesh.adjacency import FaceAdjacency
 from ..mesh.surface import Surface, indicator
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray, connected_groups, unique_edges
 from ..progress import Progress
-from .heat_flow import Flows, HeatFlow, ShortFlow
+from .heat_flow import Flows
 
 FINE, COARSE = 0.012, 0.02
 """Lengths over which normals are averaged, in units of the square root of the area: smaller details are no creases."""
@@ -71,19 +72,41 @@ def outward_signs(faces: IntArray, corners: FloatArray) -> FloatArray:
     return np.asarray(np.where(volume[island] < 0, -sign, sign))
 
 
-def vertex_normals(surface: Surface) -> FloatArray:
-    """(n', 3) outward unit normals at the vertices of a surface."""
-    mesh, original = surface.mesh, surface.original
-    corners = mesh.vertices[mesh.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    sign = outward_signs(surface.welded_faces, original.vertices[original.faces])
-    normals *= np.where(surface.face_of >= 0, sign[surface.face_of], 1.0)[:, None]
-    return _normalized(indicator(mesh.faces.ravel(), mesh.n_vertices) @ np.repeat(normals, 3, axis=0))
+class Normals:
+    """Outward normals at the vertices of a surface, averaged over lengths; each is computed once.
 
+    Parameters
+    ----------
+    surface : Surface
+        With n' vertices.
+    flows : Flows
+        On the surface.
+    """
 
-def smooth_normals(normals: FloatArray, flow: HeatFlow | ShortFlow) -> FloatArray:
-    """(n', 3) unit normals, averaged by a heat flow."""
-    return _normalized(flow.smooth(normals).astype(np.float64))
+    def __init__(self, surface: Surface, flows: Flows) -> None:
+        self._surface, self._flows = surface, flows
+        self._smooth: dict[float, FloatArray] = {}
+
+    @cached_property
+    def signs(self) -> FloatArray:
+        """(m',) 1 for each face of the surface that turns counter-clockwise seen from outside, −1 for others."""
+        surface, original = self._surface, self._surface.original
+        signs = outward_signs(surface.welded_faces, original.vertices[original.faces])
+        return np.where(surface.face_of >= 0, signs[surface.face_of], 1.0)
+
+    @cached_property
+    def sharp(self) -> FloatArray:
+        """(n', 3) unit normals that are not averaged."""
+        mesh = self._surface.mesh
+        corners = mesh.vertices[mesh.faces]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) * self.signs[:, None]
+        return _normalized(indicator(mesh.faces.ravel(), mesh.n_vertices) @ np.repeat(normals, 3, axis=0))
+
+    def over(self, length: float) -> FloatArray:
+        """(n', 3) unit normals, averaged over a length of a few edges."""
+        if length not in self._smooth:
+            self._smooth[length] = _normalized(self._flows.short(length).smooth(self.sharp))
+        return self._smooth[length]
 
 
 def curvature_across(surface: Surface, normals: FloatArray, adjacency: FaceAdjacency) -> FloatArray:
@@ -94,11 +117,6 @@ def curvature_across(surface: Surface, normals: FloatArray, adjacency: FaceAdjac
     offset = centers[b] - centers[a]
     squared = np.maximum(np.einsum("ij,ij->i", offset, offset), LEAST_THICKNESS**2)
     return np.asarray(np.einsum("ij,ij->i", face_normals[b] - face_normals[a], offset) / squared)
-
-
-def coarse_curvature(surface: Surface, adjacency: FaceAdjacency, flows: Flows) -> FloatArray:
-    """`curvature_across` between the original faces, without small details."""
-    return curvature_across(surface, smooth_normals(vertex_normals(surface), flows.short(COARSE)), adjacency)
 
 
 def log_thickness(surface: Surface, normals: FloatArray, flows: Flows, progress: Progress | None = None) -> FloatArray:
@@ -157,11 +175,14 @@ class BorderShape:
 
 
 def border_shape(
-    surface: Surface, adjacency: FaceAdjacency, flows: Flows, progress: Progress | None = None
+    surface: Surface,
+    adjacency: FaceAdjacency,
+    flows: Flows,
+    normals: Normals,
+    progress: Progress | None = None,
 ) -> BorderShape:
     """Curvature across the borders between neighbors, and thickness of the faces."""
-    normals = vertex_normals(surface)
-    fine, coarse = (smooth_normals(normals, flows.short(length)) for length in (FINE, COARSE))
+    fine, coarse = normals.over(FINE), normals.over(COARSE)
     thickness = surface.to_faces(log_thickness(surface, fine, flows, progress)[:, None])[:, 0]
     return BorderShape(
         curvature_across(surface, coarse, adjacency), curvature_across(surface, fine, adjacency), thickness
@@ -187,15 +208,6 @@ def weights_of_borders(
     distances = np.maximum(np.linalg.norm(centers[a] - centers[b], axis=1), LEAST_DISTANCE)
     step = np.minimum(np.abs(thickness[a] - thickness[b]) / distances, MOST_STEP)
     return np.asarray(np.exp(BORDER_CREASE * np.clip(curvature, -MOST_CONCAVE, MOST_CONVEX) - BORDER_STEP * step))
-
-
-def border_weights(
-    surface: Surface, adjacency: FaceAdjacency, progress: Progress | None = None
-) -> tuple[FloatArray, FloatArray]:
-    """(p,) weights of the borders between neighbors, 1 where the surface is flat and even, and (p,) fine curvatures."""
-    shape = border_shape(surface, adjacency, Flows(surface.mesh), progress)
-    centers = surface.original.unit_face_centers
-    return weights_of_borders(adjacency.pairs, centers, shape.coarse, shape.thickness), shape.fine
 
 
 def _touching_balls(

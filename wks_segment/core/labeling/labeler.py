@@ -18,7 +18,7 @@ from ..learning.standardizer import Standardizer
 from ..mesh.adjacency import FaceAdjacency
 from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
 from ..parts.kind_traits import KindTraits
-from ..poses.pose_cache import Kind, ResultKey, Workpiece
+from ..poses.pose_cache import Kind, ResultKey, Workpiece, smooth_means
 from ..poses.pose_signature import PoseSignature, of_one_mesh
 from ..progress import Progress
 from .learned_areas import with_learned_areas
@@ -86,21 +86,9 @@ class Labeler:
         return self._merged(self._raw(pose, self.n_kept), self.n_segments)
 
     def smoothed(self, pose: Workpiece, n_groups: int) -> FloatArray:
-        """(n', n_groups) smoothed posteriors of groups at the vertices of a pose.
-
-        Posteriors of kinds are kept with the pose: they are the same for every number of groups.
-        """
-        if not self._keeps(len(pose.signature)):
-            return self._smooth(pose, self._raw(pose, n_groups))
-        raw = pose.results.get(
-            ResultKey(Kind.POSTERIORS), (self.mixture, self.grouping, self.n_kept), lambda: self._raw(pose, self.n_kept)
-        )
-        smooth = pose.results.get(
-            ResultKey(Kind.SMOOTH_POSTERIORS),
-            (self.mixture, self.grouping, self.n_kept, self.length),
-            lambda: self._smooth(pose, raw),
-        )
-        return self._merged(smooth, n_groups)
+        """(n', n_groups) smoothed posteriors of groups at the vertices of a pose."""
+        raw = self._kept(pose, n_groups)
+        return pose.flows.over(self.length).smooth(raw) if self.length > 0 else raw
 
     def segments(
         self,
@@ -255,9 +243,14 @@ class Labeler:
         self, poses: Sequence[Workpiece], n_groups: int, progress: Progress
     ) -> Callable[[Workpiece], FloatArray]:
         """Function that gives the (m, n_groups) posteriors on the faces of one of the poses of a mesh."""
-        if self.traits is None or self.length == 0:
-            return lambda pose: pose.surface.to_faces(self.smoothed(pose, n_groups))
         together = poses if of_one_mesh(_pose_signatures(poses)) else None
+        if self.length == 0:
+            return lambda pose: pose.surface.to_faces(self._kept(pose, n_groups))
+        if self.traits is None:
+            if together is None:
+                return lambda pose: smooth_means([pose], lambda one: self._kept(one, n_groups), self.length)
+            found = smooth_means(poses, lambda pose: self._kept(pose, n_groups), self.length, progress)
+            return lambda pose: found
 
         def on_faces(pose: Workpiece) -> FloatArray:
             own = self._own_parts(together or [pose], progress)
@@ -286,6 +279,15 @@ class Labeler:
         """Whether posteriors of kinds at this many places are kept."""
         return count * self.n_kept <= MOST_POSTERIORS
 
+    def _kept(self, pose: Workpiece, n_groups: int) -> FloatArray:
+        """(n', n_groups) posteriors of groups at the vertices of a pose, from those of kinds that are kept with it."""
+        if not self._keeps(len(pose.signature)):
+            return self._raw(pose, n_groups)
+        of_kinds = pose.results.get(
+            ResultKey(Kind.POSTERIORS), (self.mixture, self.grouping, self.n_kept), lambda: self._raw(pose, self.n_kept)
+        )
+        return self._merged(of_kinds, n_groups)
+
     def _raw(self, pose: Workpiece, n_groups: int) -> FloatArray:
         """(n', n_groups) posteriors of groups of components at the vertices of a pose."""
         samples = self.standardizer.transform(pose.signature)
@@ -300,9 +302,6 @@ class Labeler:
             return posteriors
         owner = self.grouping.group_of_groups(fine, n_groups)
         return np.asarray(posteriors @ np.eye(n_groups, dtype=posteriors.dtype)[owner])
-
-    def _smooth(self, pose: Workpiece, posteriors: FloatArray) -> FloatArray:
-        return pose.flows.over(self.length).smooth(posteriors) if self.length > 0 else posteriors
 
     def _traits(self, regions: Regions, pose: Workpiece, n_poses: int) -> Traits:
         """Traits, in one pose, of regions that were found in `n_poses` poses together."""

@@ -203,4 +203,4 @@ def _signed_areas(pose: Workpiece, fields: FloatArray) -> FloatArray:
     corners = fields[pose.surface.mesh.faces].astype(np.float64)
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     f, g = np.triu_indices(FIELDS, 1)
-    return np.asarray((u[:, f] * v[:, g] - u[:, g] * v[:, f]) / 2 * pose.turned[:, None])
+    return np.asarray((u[:, f] * v[:, g] - u[:, g] * v[:, f]) / 2 * pose.normals.signs[:, None])

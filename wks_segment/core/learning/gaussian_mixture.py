@@ -357,9 +357,9 @@ def _log_gaussians(
         center = means.mean(axis=0)
         x, mu = (samples - center, means - center) if squares is None else (samples, means)
         squared = x**2 if squares is None else squares
-        inverse = np.broadcast_to(1 / variances, (len(variances), dimension))
         dtype = x.dtype
-        distances = squared @ inverse.T.astype(dtype) - 2 * (x @ (mu / variances).T.astype(dtype))
+        distances = x @ (-2 * mu / variances).T.astype(dtype)
+        distances += squared @ (1 / variances).T.astype(dtype)
         distances += (mu**2 / variances).sum(axis=1).astype(dtype)
         half_log_determinants = half_log_determinants.astype(dtype)
     return np.asarray(-distances / 2 - half_log_determinants - dimension * np.log(2 * np.pi) / 2)

@@ -22,7 +22,7 @@ from ..message import Message, message_of
 from ..parts.evidence import Evidence
 from ..parts.kind_traits import KindTraits
 from ..parts.kinds import Kinds, find_kinds, n_kinds_of_bodies, n_regions_of_mesh
-from ..poses.pose_cache import Workpiece
+from ..poses.pose_cache import Workpiece, smooth_means
 from ..poses.pose_signature import of_one_mesh
 from ..poses.signature_cache import Cache, content_key
 from ..progress import Progress
@@ -40,7 +40,7 @@ from .parameters import effective, least_segments
 from .standardizer import Standardizer
 from .training_samples import TrainingSamples
 
-KINDS_VERSION = 5
+KINDS_VERSION = 6
 """To be raised whenever the same poses and settings give other kinds than before."""
 AXES, WHITENING, LEAST_VARIANCE = 20, 0.25, 1e-2
 """Number of principal axes of the signatures along which parts are compared, and the power of their variance, with a
@@ -288,11 +288,11 @@ def _mean_posteriors(
     poses: Sequence[Workpiece], standardizer: Standardizer, mixture: GaussianMixture, kind: IntArray, n_kinds: int
 ) -> FloatArray:
     """(m, k) smoothed posteriors of the kinds on the faces of a mesh, mean over its poses."""
-    total: FloatArray = np.zeros(())
-    for pose in poses:
-        posteriors = mixture.group_posteriors(standardizer.transform(pose.signature), kind, n_kinds)
-        total = total + pose.surface.to_faces(pose.flows.over(SMOOTHING_LENGTH).smooth(posteriors))
-    return total / len(poses)
+
+    def posteriors(pose: Workpiece) -> FloatArray:
+        return mixture.group_posteriors(standardizer.transform(pose.signature), kind, n_kinds)
+
+    return smooth_means(poses, posteriors, SMOOTHING_LENGTH)
 
 
 def _with_vanished_first(kinds: Kinds, found: FloatArray, left: FloatArray) -> Kinds:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -99,15 +100,32 @@ class Surface:
 
     def to_faces(self, values: FloatArray) -> FloatArray:
         """(m, k) area-weighted means over the original faces, of (n', k) values at the vertices of the surface."""
-        areas = self.mesh.face_areas
-        sums = indicator(self.face_of, self.original.n_faces)
-        total = sums @ areas
-        face_values = values[self.mesh.faces].mean(axis=1)
-        means = sums @ (face_values * areas[:, None]) / np.where(total > 0, total, 1)[:, None]
+        return np.asarray(self._face_means @ values)
+
+    def from_faces(self, values: FloatArray) -> FloatArray:
+        """(n', k) area-weighted means around the vertices of the surface, of (m, k) values at the original faces.
+
+        Faces that close a hole count as 0.
+        """
+        own, areas = self.face_of >= 0, self.mesh.face_areas
+        entries = np.repeat(areas[own], 3), (self.mesh.faces[own].ravel(), np.repeat(self.face_of[own], 3))
+        sums = csr_matrix(entries, shape=(self.mesh.n_vertices, self.original.n_faces))
+        total = np.bincount(self.mesh.faces.ravel(), np.repeat(areas, 3), self.mesh.n_vertices)
+        return np.asarray(sums @ values / np.maximum(total, np.finfo(float).tiny)[:, None])
+
+    @cached_property
+    def _face_means(self) -> csr_matrix:
+        """(m, n') matrix that takes the area-weighted mean over each original face."""
+        areas, own = self.mesh.face_areas, self.face_of >= 0
+        total = np.bincount(self.face_of[own], areas[own], self.original.n_faces)
         # A face that is not on the surface, or has no area, takes the mean of its corners.
-        without = total <= 0
-        means[without] = values[self.vertex_of[self.original.faces[without]]].mean(axis=1)
-        return means
+        without = np.flatnonzero(total <= 0)
+        shares = areas[own] / np.where(total > 0, total, 1)[self.face_of[own]]
+        weights = np.append(shares, np.ones(len(without)))
+        rows = np.append(self.face_of[own], without)
+        corners = np.concatenate([self.mesh.faces[own], self.vertex_of[self.original.faces[without]]])
+        entries = np.repeat(weights / 3, 3), (np.repeat(rows, 3), corners.ravel())
+        return csr_matrix(entries, shape=(self.original.n_faces, self.mesh.n_vertices))
 
 
 @dataclass(frozen=True)

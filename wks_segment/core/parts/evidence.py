@@ -27,7 +27,7 @@ SHAPE_VERSION = 1
 """To be raised whenever the same pose has other creases or thickness than before."""
 TIE_CURVATURE = -6.0
 """Curvature where islands are tied: they meet like parts in a crease, not like the halves of a flat sheet."""
-MOST_SHAPES = 5
+MOST_SHAPES = 3
 """Most poses whose creases and thickness are measured; more hardly change the means."""
 
 
@@ -144,7 +144,7 @@ def _shape_of(pose: Workpiece, cache: Cache | None, progress: Progress) -> Borde
                 return BorderShape(**(cache.arrays(key) or {}))
             except TypeError:  # not cached
                 progress(0.0)
-        shape = border_shape(pose.surface, pose.neighbors, pose.flows, progress)
+        shape = border_shape(pose.surface, pose.neighbors, pose.flows, pose.normals, progress)
         if cache is not None:
             try:
                 cache.keep(key, vars(shape))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..geometry.creases import smooth_normals, vertex_normals
+from ..geometry.creases import FINE
 from ..mesh.canonical import in_steps
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ..poses.pose_cache import Workpiece
@@ -21,8 +21,6 @@ SLACK = 0.004
 """How far outside, in units of the square root of the area, a line of sight may run, since surfaces are bent."""
 OUTWARD = 0.05
 """Sine of the angle by which a line may leave the surface on the outer side: faces of one flat patch see each other."""
-NORMAL_LENGTH = 0.012
-"""Length over which normals are averaged, in the same unit."""
 NEAREST_SLACK = 0.2
 """Relative error that the search for the nearest vertex may make: it matters near the surface, where it is small."""
 MOST_VERTICES = 3_000
@@ -34,7 +32,7 @@ def visible(pose: Workpiece, faces: IntArray, progress: Progress | None = None) 
     surface = pose.surface
     unit = np.sqrt(surface.mesh.area)
     vertices = surface.mesh.vertices / unit
-    normals = smooth_normals(vertex_normals(surface), pose.flows.short(NORMAL_LENGTH))
+    normals = pose.normals.over(FINE)
     places = in_steps(surface.to_faces(vertices)[faces])
     directions = surface.to_faces(normals)[faces]
     stride = max(1, len(vertices) // MOST_VERTICES)

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from enum import Enum, auto
 from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from ..geometry.creases import coarse_curvature, outward_signs
+from ..geometry.creases import COARSE, Normals, curvature_across
 from ..geometry.heat_flow import Flows
 from ..mesh.adjacency import FaceAdjacency
+from ..mesh.canonical import spread
 from ..mesh.surface import Surface
 from ..mesh.triangle_mesh import FloatArray, TriangleMesh
+from ..progress import Progress
 from .pose_signature import PoseSignature
 
 Result = TypeVar("Result")
@@ -23,7 +25,6 @@ class Kind(Enum):
     """Kinds of intermediate results that are kept with a pose."""
 
     POSTERIORS = auto()
-    SMOOTH_POSTERIORS = auto()
     POLYGON_MESH = auto()
     MEAN_POSTERIORS = auto()
     POLYGON_NEIGHBORS = auto()
@@ -92,6 +93,8 @@ class Workpiece:
     ----------
     flows : Flows
         Heat flows on the surface.
+    normals : Normals
+        Outward normals of the surface.
     results : ResultCache
         Intermediate results of models on this pose.
     """
@@ -99,6 +102,7 @@ class Workpiece:
     def __init__(self, pose: PoseSignature) -> None:
         self.pose = pose
         self.flows = Flows(pose.surface.mesh)
+        self.normals = Normals(pose.surface, self.flows)
         self.results = ResultCache()
 
     @property
@@ -118,16 +122,33 @@ class Workpiece:
         return FaceAdjacency.of(self.surface.welded_faces, original.vertices / np.sqrt(original.area))
 
     @cached_property
-    def turned(self) -> FloatArray:
-        """(m',) 1 for each face of the surface that turns counter-clockwise seen from outside, −1 for others."""
-        mesh = self.surface.mesh
-        return outward_signs(mesh.faces, mesh.vertices[mesh.faces])
-
-    @cached_property
     def curvature(self) -> FloatArray:
         """(p,) curvature across the border of each pair of `neighbors`."""
-        return coarse_curvature(self.surface, self.neighbors, self.flows)
+        return curvature_across(self.surface, self.normals.over(COARSE), self.neighbors)
+
+    def smooth_on_faces(self, values: FloatArray, length: float) -> FloatArray:
+        """(m, k) values of the original faces, averaged over the surface within about a length."""
+        # What a hole takes up is seen by how much of a constant it takes up.
+        constant = np.ones((len(values), 1), dtype=values.dtype)
+        at_vertices = self.surface.from_faces(np.concatenate([values, constant], axis=1))
+        smooth = self.surface.to_faces(self.flows.over(length).smooth(at_vertices))
+        return smooth[:, :-1] / smooth[:, -1:]
 
 
 AnyPose = TriangleMesh | PoseSignature | Workpiece
 """A pose as methods of a model accept it: the later in this list, the less is left to compute."""
+
+
+def smooth_means(
+    poses: Sequence[Workpiece],
+    at_vertices: Callable[[Workpiece], FloatArray],
+    length: float,
+    progress: Progress | None = None,
+) -> FloatArray:
+    """(m, k) mean over the poses of one mesh of values at their vertices, averaged over the surface within a length.
+
+    Averaging over the surface is about the same in every pose: it is done once, where limbs are stretched out most.
+    """
+    stretched = max(poses, key=lambda pose: spread(pose.surface.original))
+    values = [pose.surface.to_faces(at_vertices(pose)) for pose, _ in Progress.of(progress).each(list(poses))]
+    return stretched.smooth_on_faces(np.mean(values, axis=0), length)
