@@ -18,7 +18,7 @@ from ..learning.standardizer import Standardizer
 from ..mesh.adjacency import FaceAdjacency
 from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
 from ..parts.kind_traits import KindTraits
-from ..poses.pose_cache import Kind, ResultKey, Workpiece, smooth_means
+from ..poses.pose_cache import Kind, ResultKey, Workpiece
 from ..poses.pose_signature import PoseSignature, of_one_mesh
 from ..progress import Progress
 from .learned_areas import with_learned_areas
@@ -243,14 +243,9 @@ class Labeler:
         self, poses: Sequence[Workpiece], n_groups: int, progress: Progress
     ) -> Callable[[Workpiece], FloatArray]:
         """Function that gives the (m, n_groups) posteriors on the faces of one of the poses of a mesh."""
+        if self.traits is None or self.length == 0:
+            return lambda pose: pose.surface.to_faces(self.smoothed(pose, n_groups))
         together = poses if of_one_mesh(_pose_signatures(poses)) else None
-        if self.length == 0:
-            return lambda pose: pose.surface.to_faces(self._kept(pose, n_groups))
-        if self.traits is None:
-            if together is None:
-                return lambda pose: smooth_means([pose], lambda one: self._kept(one, n_groups), self.length)
-            found = smooth_means(poses, lambda pose: self._kept(pose, n_groups), self.length, progress)
-            return lambda pose: found
 
         def on_faces(pose: Workpiece) -> FloatArray:
             own = self._own_parts(together or [pose], progress)
