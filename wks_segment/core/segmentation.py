@@ -191,7 +191,7 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
             learned, atlases = self._recognized(
                 learned, training.standardizer, poses, rest, overall.part(GROUPED, RECOGNIZED)
             )
-        self._set_learned(learned, training.standardizer, atlases, usual_scores(learned.mixture, training))
+        self._set_learned(learned, training.standardizer, atlases, usual_scores(learned, training))
         self.part_notes_ = PartNotes()
         overall(1.0, "done")
         return self
@@ -202,8 +202,9 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
 
         Comparable between models with the same number of energies and the same scaling; see `comparable_score`.
         """
-        likelihoods, pose = self._log_likelihoods(mesh)
+        mixture, pose = self._fitted(), self._described(mesh)
         masses = unit_area_masses(pose.surface.mesh)
+        likelihoods = mixture.log_likelihoods(self.standardizer_.transform(pose.signature))
         return float(masses @ likelihoods / masses.sum() - self.standardizer_.log_volume)
 
     @one_blas_thread
@@ -211,9 +212,12 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
         """How well the model explains a shape, comparable between all models: for `rank`.
 
         Like `score`, but without the least likely tenth of the area, per energy, and as a density of the logarithm of
-        the signature, whatever the scaling.
+        the signature, whatever the scaling. Of a covariance "tied" only the variances count, but with the paper's
+        setting.
         """
-        likelihoods, pose = self._log_likelihoods(mesh)
+        pose = self._described(mesh)
+        mixture = self._learned().for_ranking(self._fitted())
+        likelihoods = mixture.log_likelihoods(self.standardizer_.transform(pose.signature))
         masses = unit_area_masses(pose.surface.mesh)
         return comparable_score(self.standardizer_, likelihoods, pose.signature, masses / masses.sum())
 
@@ -294,12 +298,12 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
 
     def to_json(self) -> str:
         """The fitted model as JSON text; ValueError if it is not fitted."""
-        mixture, atlases = self._fitted(), None
+        learned, atlases = self._learned(), None
         if self.regions_ is not None and self.sides_ is not None:
             atlases = self.regions_, self.sides_
         return model_file.encode(
             model_file.ModelContent(
-                self._parameters(), PartMixture(mixture, self.grouping_, self.kind_traits_), self.standardizer_,
+                self._parameters(), learned, self.standardizer_,
                 atlases, self.usual_scores_, self.part_notes_,
             )
         )  # fmt: skip
@@ -322,6 +326,10 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
     def spread_(self) -> FloatArray:
         """(n_energies,) standard deviation of the scaled training signatures over the area."""
         return self.standardizer_.spread
+
+    def _learned(self) -> PartMixture:
+        """What was learned of the parts; NotFittedError if nothing was."""
+        return PartMixture(self._fitted(), self.grouping_, self.kind_traits_)
 
     def _set_learned(
         self,
@@ -371,8 +379,3 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
     def _laplacian(self) -> Literal["auto"] | Laplacian:
         laplacian: Literal["auto"] | Laplacian = self._effective("laplacian")
         return laplacian
-
-    def _log_likelihoods(self, mesh: AnyPose) -> tuple[FloatArray, Workpiece]:
-        """(n',) log-likelihoods of the standardized signature at the vertices of a pose, and the pose."""
-        mixture, pose = self._fitted(), self._described(mesh)
-        return mixture.log_likelihoods(self.standardizer_.transform(pose.signature)), pose

@@ -114,6 +114,12 @@ class GaussianMixture:
         sums = np.maximum(np.exp(logs - highest) @ member, np.finfo(float).tiny)
         return np.asarray(np.log(sums) + highest - np.log(self.weights @ member))
 
+    def without_correlations(self) -> GaussianMixture:
+        """The mixture with the diagonal of the one full covariance; itself if it is of another type."""
+        if self.covariance_type != "tied":
+            return self
+        return GaussianMixture("shared", self.weights, self.means, np.diag(self.covariances).copy())
+
     def log_likelihoods(self, samples: FloatArray) -> FloatArray:
         """(n,) log-density of the whole mixture at (n, d) samples."""
         return np.asarray(logsumexp(self.log_densities(samples), axis=1))
@@ -357,9 +363,9 @@ def _log_gaussians(
         center = means.mean(axis=0)
         x, mu = (samples - center, means - center) if squares is None else (samples, means)
         squared = x**2 if squares is None else squares
+        inverse = np.broadcast_to(1 / variances, (len(variances), dimension))
         dtype = x.dtype
-        distances = x @ (-2 * mu / variances).T.astype(dtype)
-        distances += squared @ (1 / variances).T.astype(dtype)
+        distances = squared @ inverse.T.astype(dtype) - 2 * (x @ (mu / variances).T.astype(dtype))
         distances += (mu**2 / variances).sum(axis=1).astype(dtype)
         half_log_determinants = half_log_determinants.astype(dtype)
     return np.asarray(-distances / 2 - half_log_determinants - dimension * np.log(2 * np.pi) / 2)

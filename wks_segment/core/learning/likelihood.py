@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import reduce
 
 import numpy as np
 
 from ..mesh.triangle_mesh import FloatArray, IntArray
 from .gaussian_mixture import GaussianMixture, Moments, squares_of, variance_floor
+from .part_mixture import PartMixture
 from .standardizer import Standardizer
 from .training_samples import TrainingSamples
 
@@ -42,16 +44,18 @@ def comparable_score(
     return likely_mean(densities, shares) / standardizer.n_energies
 
 
-def usual_scores(mixture: GaussianMixture, training: TrainingSamples) -> FloatArray:
+def usual_scores(learned: PartMixture, training: TrainingSamples) -> FloatArray:
     """(poses,) comparable score that each training pose would have, had it not been learned.
 
     For a single pose it is the score that it has.
     """
     samples = training.standardized
     if training.n_poses > 1:
-        likelihoods = left_out_likelihoods(mixture, samples, training.shares, training.pose)
+        likelihoods = left_out_likelihoods(
+            learned.mixture, samples, training.shares, training.pose, learned.for_ranking
+        )
     else:
-        likelihoods = mixture.log_likelihoods(samples)
+        likelihoods = learned.for_ranking(learned.mixture).log_likelihoods(samples)
     scores = []
     for pose in np.unique(training.pose):
         chosen = training.pose == pose
@@ -61,7 +65,11 @@ def usual_scores(mixture: GaussianMixture, training: TrainingSamples) -> FloatAr
 
 
 def left_out_likelihoods(
-    mixture: GaussianMixture, samples: FloatArray, shares: FloatArray, group: IntArray
+    mixture: GaussianMixture,
+    samples: FloatArray,
+    shares: FloatArray,
+    group: IntArray,
+    simplified: Callable[[GaussianMixture], GaussianMixture],
 ) -> FloatArray:
     """Log-likelihoods of samples under a mixture that was learned without their group.
 
@@ -77,6 +85,8 @@ def left_out_likelihoods(
         Weights of the samples: positive, sum to 1.
     group : (n,) int array
         Group of each sample, of at least two groups.
+    simplified
+        Gives the mixture whose likelihoods are asked for.
 
     Returns
     -------
@@ -90,5 +100,5 @@ def left_out_likelihoods(
     likelihoods = np.empty(len(samples))
     for inside, own in zip(groups, moments, strict=True):
         others = reduce(Moments.plus, (one for one in moments if one is not own))
-        likelihoods[inside] = others.mixture(kind, floor).log_likelihoods(samples[inside])
+        likelihoods[inside] = simplified(others.mixture(kind, floor)).log_likelihoods(samples[inside])
     return likelihoods

@@ -79,6 +79,17 @@ class PartMixture:
     grouping: MergeTree | None
     traits: KindTraits | None
 
+    def for_ranking(self, mixture: GaussianMixture) -> GaussianMixture:
+        """A mixture of these parts as its densities tell which model fits a shape.
+
+        A full covariance tells parts of one mesh apart, but between meshes its small eigenvalues, which are noise of
+        the learned poses, outweigh everything else: variances alone count. The paper's setting is kept, and models of
+        0.1.0, whose usual scores were computed with the covariance that they have.
+        """
+        if self.grouping is None or self.grouping.areas is None:
+            return mixture
+        return mixture.without_correlations()
+
 
 def learn_parts(
     parameters: Mapping[str, Any],
