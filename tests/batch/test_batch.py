@@ -16,7 +16,7 @@ from full_disk import files_end_at
 from wks_segment.batch import BatchError, Limits, Outcome, Program, merge_logs
 from wks_segment.batch.results_log import ResultsLog, read_log
 from wks_segment.core.progress import Progress
-from wks_segment.interruption import interruptible
+from wks_segment.interruption import Interrupted, interruptible
 
 QUIET = Progress()
 
@@ -268,7 +268,7 @@ def test_ctrl_c_ends_the_children_and_says_how_to_continue(batch, tmp_path, befo
             pids.append(int((tmp_path / "out" / "a.txt").read_text().split()[1]))
             os.kill(os.getpid(), signal.SIGINT)
 
-    with pytest.raises(BatchError, match=r"ended by the user with 1 of 3 files done.*--resume"), interruptible():
+    with pytest.raises(Interrupted, match=r"interrupted, with 1 of 3 files done.*--resume"), interruptible():
         batch({"a": "one", "b": "sleep 50", "c": "sleep 50"}).run(Progress(interrupt))
     assert signal.getsignal(signal.SIGINT) is before
     with pytest.raises(ProcessLookupError):

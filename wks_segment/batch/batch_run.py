@@ -14,6 +14,7 @@ from typing import Any
 
 from ..core.files.whole_file import is_disk_full
 from ..core.progress import Progress
+from ..interruption import Interrupted
 from . import local_pool
 from .child_process import Program
 from .errors import BatchError, disk_full_error
@@ -74,8 +75,10 @@ class Batch:
         ------
         BatchError
             If the folder contains anything else or cannot be written to, if a file that would be written exists
-            already, if another batch is running in the folder, if no child process can be started, if the disk is
-            full, or if the user ends the batch.
+            already, if another batch is running in the folder, if no child process can be started, or if the disk is
+            full.
+        Interrupted
+            If a signal ends the batch.
         """
         try:
             return self._run(progress)
@@ -150,11 +153,9 @@ class Batch:
                     seconds_left = (time.monotonic() - begun) / (n_done - n_before) * (n_files - n_done)
                     text = _progress_text(n_done, n_files, n_failed, seconds_left)
                     progress(n_done / n_files, f"{text}: {outcome.name}")
-            except KeyboardInterrupt:
-                raise BatchError(
-                    f"ended by the user with {n_done} of {n_files} files done: continue with the same command and "
-                    "--resume"
-                ) from None
+            except Interrupted as end:
+                state = f", with {n_done} of {n_files} files done: continue with the same command and --resume"
+                raise Interrupted(end.number, state) from None
 
     def _outcomes(self, jobs: Sequence[Job], unfinished: Path) -> Generator[Outcome]:
         """Outcome of each job as soon as it has ended, in any order."""
