@@ -121,6 +121,18 @@ def test_a_batch_killed_before_it_moved_a_result_is_resumed(batch, tmp_path):
     assert not (out / ".unfinished").exists()
 
 
+def test_what_killed_children_left_beside_scenes_is_removed(batch, tmp_path):
+    """And nothing of another part of the batch, which may be running."""
+    outputs = {"--output": "inner/{}.txt"}
+    jobs = batch({"a": "one", "b": "two"}, outputs=outputs).jobs
+    batch({"a": "one", "b": "two"}, outputs=outputs, part=(1, 2)).run(QUIET)
+    left = [tmp_path / "out" / "inner" / f".wks_segment-{job.key}-abc.blend@" for job in jobs]
+    for path in left:
+        path.write_text("half a scene")
+    assert batch({"a": "one", "b": "two"}, outputs=outputs, part=(1, 2), resume=True).run(QUIET)["now"] == 0
+    assert [path.exists() for path in left] == [False, True]
+
+
 def test_changed_files_and_settings_are_run_again(batch, tmp_path):
     batch({"a": "one", "b": "two"}).run(QUIET)
     assert batch({"a": "other", "b": "two"}, resume=True).run(QUIET)["now"] == 1

@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from ..core.files.whole_file import is_disk_full
+from ..core.files.whole_file import UNFINISHED_PREFIX, is_disk_full
 from ..core.progress import Progress
 from ..interruption import Interrupted
 from . import local_pool
@@ -101,7 +101,7 @@ class Batch:
         with ResultsLog(self.folder / name) as log:
             for outcome in log.outcomes.values():  # a batch may have been killed before it moved these results
                 self._move_results(outcome, unfinished)
-            shutil.rmtree(unfinished, ignore_errors=True)
+            self._remove_unfinished(jobs, unfinished)
             waiting = [job for job in jobs if not self._is_finished(job, log.outcomes.get(job.input))]
             self._check_outputs(waiting)
             unfinished.mkdir(parents=True)
@@ -116,7 +116,7 @@ class Batch:
 
     def _finish(self, jobs: Sequence[Job], log: ResultsLog, unfinished: Path) -> tuple[list[Outcome], Path]:
         """Remove the temporary folder and write the report; outcomes of the jobs, and path of the report."""
-        shutil.rmtree(unfinished, ignore_errors=True)
+        self._remove_unfinished(jobs, unfinished)
         with suppress(OSError):  # other parts of the batch have theirs in it
             (self.folder / UNFINISHED_FOLDER).rmdir()
         finished = [log.outcomes[job.input] for job in jobs if job.input in log.outcomes]
@@ -174,6 +174,15 @@ class Batch:
                 f'--scheduler needs Dask, which is not installed in {sys.executable}: pip install "wks-segment[dask]", '
                 "here and on the workers"
             )
+
+    def _remove_unfinished(self, jobs: Sequence[Job], unfinished: Path) -> None:
+        """Remove the temporary folder, and files that killed children left in the places of scenes."""
+        shutil.rmtree(unfinished, ignore_errors=True)
+        keys = {job.key for job in jobs}  # other parts of the batch may be writing to the same places
+        for place in filter(None, {job.place_of_scene(self.folder) for job in jobs}):
+            for left in place.glob(f"{UNFINISHED_PREFIX}*"):
+                if left.name.removeprefix(UNFINISHED_PREFIX).partition("-")[0] in keys:
+                    left.unlink(missing_ok=True)
 
     def _move_results(self, outcome: Outcome, unfinished: Path) -> None:
         """Move the results of a job that are still in their temporary folder to their place."""

@@ -93,6 +93,7 @@ def add_outputs(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--output", type=named_path, help=f"write the scene to this file ({', '.join(file_formats.EXPORTERS)})"
     )
+    parser.add_argument("--unfinished", type=named_path, help=argparse.SUPPRESS)  # for batches: see `Job`
     parser.add_argument("--render", type=named_path, metavar="PNG", help="write a picture of all poses side by side")
     add_output_settings(parser)
 
