@@ -58,6 +58,7 @@ def test_apply_writes_scenes_and_pictures(command, learned, characters, tmp_path
     assert len(list((tmp_path / "cache").glob("*.npz"))) == 3
     page = (tmp_path / "out" / "report.html").read_text()
     assert 'src="thumbnails/1.png"' in page
+    assert list(bpy.data.images.load(str(tmp_path / "out" / "thumbnails" / "1.png")).size) == [320, 320]
 
 
 def test_the_best_of_several_models_is_found_and_applied(command, learned, characters, tmp_path):
