@@ -262,6 +262,22 @@ def test_a_program_that_does_not_start_is_named(batch, tmp_path):
     assert batch({"a": "one"}).run(QUIET)["done"] == 1, "a batch that did not start leaves a file behind"
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no signals")
+@pytest.mark.parametrize("kills", [2, 3])
+def test_a_child_that_is_killed_while_it_starts_is_started_again(batch, tmp_path, kills):
+    """Somebody or the system may do that; a program that can never start ends the batch all the same."""
+    fake = " ".join(batch({"a": "one"}).program.command)
+    (tmp_path / "start.sh").write_text(
+        f'echo >> "$0.count"; [ $(wc -l < "$0.count") -gt {kills} ] || kill -9 $$; exec {fake} "$1"'
+    )
+    program = Program(("sh", str(tmp_path / "start.sh")))
+    if kills < 3:
+        assert batch({"a": "one"}, program=program, processes=1).run(QUIET)["done"] == 1
+    else:
+        with pytest.raises(BatchError, match=r"no child process could be started by .*SIGKILL"):
+            batch({"a": "one"}, program=program, processes=1).run(QUIET)
+
+
 def test_a_part_without_files_is_refused(batch):
     with pytest.raises(BatchError, match="--part 3/3: there are only 2 files"):
         batch({"a": "one", "b": "two"}, part=(3, 3)).run(QUIET)
