@@ -200,7 +200,8 @@ def save_scene(path: Path, first: Path | None = None) -> None:
 
 def _export(path: Path) -> None:
     try:
-        EXPORTERS[path.suffix.lower()](str(path))
+        with silent():
+            EXPORTERS[path.suffix.lower()](str(path))
     except RuntimeError as error:
         if path.suffix.lower() == ".blend" and not path.exists() and _is_larger_than_space(path.parent):
             raise no_space(path) from error
