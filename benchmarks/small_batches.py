@@ -101,8 +101,13 @@ def disturbed(
     killed: Counter[str] = Counter()
     scheduler = ["--scheduler", address] if address else []
     process = batch(inputs, model, out, *scheduler)
-    while sum(killed.values()) < kills and (process.poll() is None or killed["batch"] == 0):
+    ended_early = 0
+    while sum(killed.values()) < kills and process.poll() != 0:
         time.sleep(turn.uniform(0.5, LONGEST_PAUSE))
+        if process.poll():  # with a reason, or with failed files
+            ended_early += 1
+            process = batch(inputs, model, out, "--resume", "--retry", *scheduler)
+            continue
         victim = turn.choice(["child", "child", "batch", *(["worker"] if workers else [])])
         if victim == "batch":
             process.kill()
@@ -122,7 +127,7 @@ def disturbed(
         process.wait()
         rounds += 1
     counts = ", ".join(f"{name} {count} times" for name, count in sorted(killed.items()))
-    print(f"killed: {counts}; resumed {killed['batch'] + rounds} times, {rounds} of them with --retry")
+    print(f"killed: {counts}; resumed {killed['batch'] + ended_early + rounds} times, {rounds} of them at the end")
 
 
 def compare(whole: Path, killed: Path, n_files: int) -> None:

@@ -14,15 +14,23 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 class Interrupted(KeyboardInterrupt):
     """A signal that ends the command.
 
+    Parameters
+    ----------
+    number : int
+        Of the signal.
+    state : str
+        What was done by then and how to continue, as the end of the message.
+
     Attributes
     ----------
+    number : int
     code : int
         Exit code, as shells have it: 130 after Ctrl+C, 143 after SIGTERM.
     """
 
-    def __init__(self, number: int) -> None:
-        super().__init__("interrupted" if number == signal.SIGINT else "ended from outside (SIGTERM)")
-        self.code = 128 + number
+    def __init__(self, number: int, state: str = "") -> None:
+        super().__init__(("interrupted" if number == signal.SIGINT else "ended from outside (SIGTERM)") + state)
+        self.number, self.code = number, 128 + number
 
 
 def interruptible() -> AbstractContextManager[None]:

@@ -16,7 +16,7 @@ from full_disk import files_end_at
 from wks_segment.batch import BatchError, Limits, Outcome, Program, merge_logs
 from wks_segment.batch.results_log import ResultsLog, read_log
 from wks_segment.core.progress import Progress
-from wks_segment.interruption import interruptible
+from wks_segment.interruption import Interrupted, interruptible
 
 QUIET = Progress()
 
@@ -119,6 +119,18 @@ def test_a_batch_killed_before_it_moved_a_result_is_resumed(batch, tmp_path):
     assert batch({"a": "one", "b": "two"}, resume=True).run(QUIET)["now"] == 0
     assert results(out) == {"a.txt", "b.txt"}
     assert not (out / ".unfinished").exists()
+
+
+def test_what_killed_children_left_beside_scenes_is_removed(batch, tmp_path):
+    """And nothing of another part of the batch, which may be running."""
+    outputs = {"--output": "inner/{}.txt"}
+    jobs = batch({"a": "one", "b": "two"}, outputs=outputs).jobs
+    batch({"a": "one", "b": "two"}, outputs=outputs, part=(1, 2)).run(QUIET)
+    left = [tmp_path / "out" / "inner" / f".wks_segment-{job.key}-abc.blend@" for job in jobs]
+    for path in left:
+        path.write_text("half a scene")
+    assert batch({"a": "one", "b": "two"}, outputs=outputs, part=(1, 2), resume=True).run(QUIET)["now"] == 0
+    assert [path.exists() for path in left] == [False, True]
 
 
 def test_changed_files_and_settings_are_run_again(batch, tmp_path):
@@ -250,6 +262,22 @@ def test_a_program_that_does_not_start_is_named(batch, tmp_path):
     assert batch({"a": "one"}).run(QUIET)["done"] == 1, "a batch that did not start leaves a file behind"
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no signals")
+@pytest.mark.parametrize("kills", [2, 3])
+def test_a_child_that_is_killed_while_it_starts_is_started_again(batch, tmp_path, kills):
+    """Somebody or the system may do that; a program that can never start ends the batch all the same."""
+    fake = " ".join(batch({"a": "one"}).program.command)
+    (tmp_path / "start.sh").write_text(
+        f'echo >> "$0.count"; [ $(wc -l < "$0.count") -gt {kills} ] || kill -9 $$; exec {fake} "$1"'
+    )
+    program = Program(("sh", str(tmp_path / "start.sh")))
+    if kills < 3:
+        assert batch({"a": "one"}, program=program, processes=1).run(QUIET)["done"] == 1
+    else:
+        with pytest.raises(BatchError, match=r"no child process could be started by .*SIGKILL"):
+            batch({"a": "one"}, program=program, processes=1).run(QUIET)
+
+
 def test_a_part_without_files_is_refused(batch):
     with pytest.raises(BatchError, match="--part 3/3: there are only 2 files"):
         batch({"a": "one", "b": "two"}, part=(3, 3)).run(QUIET)
@@ -268,7 +296,7 @@ def test_ctrl_c_ends_the_children_and_says_how_to_continue(batch, tmp_path, befo
             pids.append(int((tmp_path / "out" / "a.txt").read_text().split()[1]))
             os.kill(os.getpid(), signal.SIGINT)
 
-    with pytest.raises(BatchError, match=r"ended by the user with 1 of 3 files done.*--resume"), interruptible():
+    with pytest.raises(Interrupted, match=r"interrupted, with 1 of 3 files done.*--resume"), interruptible():
         batch({"a": "one", "b": "sleep 50", "c": "sleep 50"}).run(Progress(interrupt))
     assert signal.getsignal(signal.SIGINT) is before
     with pytest.raises(ProcessLookupError):

@@ -3,10 +3,11 @@
 import json
 from functools import cache
 
-import bmesh
 import bpy
 import numpy as np
 import pytest
+
+import bmesh  # isort: skip  # part of Blender, which must be loaded first
 
 from wks_segment.blender.outputs.ledger import LEDGER
 from wks_segment.blender.outputs.part_attributes import has_labels

@@ -12,8 +12,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from ..core.files.whole_file import is_disk_full
+from ..core.files.whole_file import UNFINISHED_PREFIX, is_disk_full
 from ..core.progress import Progress
+from ..interruption import Interrupted
 from . import local_pool
 from .child_process import Program
 from .errors import BatchError, disk_full_error
@@ -74,8 +75,10 @@ class Batch:
         ------
         BatchError
             If the folder contains anything else or cannot be written to, if a file that would be written exists
-            already, if another batch is running in the folder, if no child process can be started, if the disk is
-            full, or if the user ends the batch.
+            already, if another batch is running in the folder, if no child process can be started, or if the disk is
+            full.
+        Interrupted
+            If a signal ends the batch.
         """
         try:
             return self._run(progress)
@@ -98,7 +101,7 @@ class Batch:
         with ResultsLog(self.folder / name) as log:
             for outcome in log.outcomes.values():  # a batch may have been killed before it moved these results
                 self._move_results(outcome, unfinished)
-            shutil.rmtree(unfinished, ignore_errors=True)
+            self._remove_unfinished(jobs, unfinished)
             waiting = [job for job in jobs if not self._is_finished(job, log.outcomes.get(job.input))]
             self._check_outputs(waiting)
             unfinished.mkdir(parents=True)
@@ -113,7 +116,7 @@ class Batch:
 
     def _finish(self, jobs: Sequence[Job], log: ResultsLog, unfinished: Path) -> tuple[list[Outcome], Path]:
         """Remove the temporary folder and write the report; outcomes of the jobs, and path of the report."""
-        shutil.rmtree(unfinished, ignore_errors=True)
+        self._remove_unfinished(jobs, unfinished)
         with suppress(OSError):  # other parts of the batch have theirs in it
             (self.folder / UNFINISHED_FOLDER).rmdir()
         finished = [log.outcomes[job.input] for job in jobs if job.input in log.outcomes]
@@ -150,11 +153,9 @@ class Batch:
                     seconds_left = (time.monotonic() - begun) / (n_done - n_before) * (n_files - n_done)
                     text = _progress_text(n_done, n_files, n_failed, seconds_left)
                     progress(n_done / n_files, f"{text}: {outcome.name}")
-            except KeyboardInterrupt:
-                raise BatchError(
-                    f"ended by the user with {n_done} of {n_files} files done: continue with the same command and "
-                    "--resume"
-                ) from None
+            except Interrupted as end:
+                state = f", with {n_done} of {n_files} files done: continue with the same command and --resume"
+                raise Interrupted(end.number, state) from None
 
     def _outcomes(self, jobs: Sequence[Job], unfinished: Path) -> Generator[Outcome]:
         """Outcome of each job as soon as it has ended, in any order."""
@@ -173,6 +174,15 @@ class Batch:
                 f'--scheduler needs Dask, which is not installed in {sys.executable}: pip install "wks-segment[dask]", '
                 "here and on the workers"
             )
+
+    def _remove_unfinished(self, jobs: Sequence[Job], unfinished: Path) -> None:
+        """Remove the temporary folder, and files that killed children left in the places of scenes."""
+        shutil.rmtree(unfinished, ignore_errors=True)
+        keys = {job.key for job in jobs}  # other parts of the batch may be writing to the same places
+        for place in filter(None, {job.place_of_scene(self.folder) for job in jobs}):
+            for left in place.glob(f"{UNFINISHED_PREFIX}*"):
+                if left.name.removeprefix(UNFINISHED_PREFIX).partition("-")[0] in keys:
+                    left.unlink(missing_ok=True)
 
     def _move_results(self, outcome: Outcome, unfinished: Path) -> None:
         """Move the results of a job that are still in their temporary folder to their place."""

@@ -32,6 +32,8 @@ POLL_SECONDS, POLL_SHARE = (0.002, 0.05), 0.05
 """Shortest and longest time between two checks of a child, and their share of the time that a call has taken so far."""
 START_SECONDS = 180.0
 """Time limit for the start of a child; Blender on a slow network drive takes long."""
+STARTS = 3
+"""Most times that a child is started if it is killed before it is ready: by somebody, or because memory was short."""
 EXIT_SECONDS = 5.0
 """Time that an idle child has to end by itself before it is killed."""
 MAX_CALLS = 100
@@ -80,7 +82,7 @@ class ChildError(Exception):
     Attributes
     ----------
     may_retry : bool
-        Whether a new process might succeed, since this one had run other jobs before.
+        Whether a new process might succeed, since this one had run other jobs before, or was killed before the first.
     """
 
     def __init__(self, reason: str, may_retry: bool = False) -> None:
@@ -122,7 +124,7 @@ class ChildProcess:
         """
         if self._n_calls >= MAX_CALLS:
             self.close()
-        process = self._process or self._start()
+        process = self._process or self._started()
         self._n_calls += 1
         call = {"number": self._n_calls, "arguments": list(arguments), "seconds": seconds}
         try:
@@ -152,6 +154,19 @@ class ChildProcess:
             self._process.kill()
             self._forget()
 
+    def _started(self) -> subprocess.Popen[bytes]:
+        """A new process that is ready for calls; BatchError if there is none."""
+        for i in range(STARTS):
+            process = self._start()
+            try:
+                self._wait_for(self._folder / READY_FILE, process, START_SECONDS)
+                break
+            except ChildError as error:
+                if not error.may_retry or i == STARTS - 1:
+                    command = " ".join(self.program.command)
+                    raise BatchError(f"no child process could be started by {command}: {error}") from error
+        return process
+
     def _start(self) -> subprocess.Popen[bytes]:
         self._folder = Path(tempfile.mkdtemp(prefix="wks_segment_child_"))
         command = [*self.program.command, str(self._folder)]
@@ -169,10 +184,6 @@ class ChildProcess:
             shutil.rmtree(self._folder, ignore_errors=True)
             raise BatchError(f"{command[0]}: it could not be started: {error.strerror or error}") from error
         self._process = process
-        try:
-            self._wait_for(self._folder / READY_FILE, process, START_SECONDS)
-        except ChildError as error:
-            raise BatchError(f"no child process could be started by {' '.join(command[:-1])}: {error}") from error
         return process
 
     def _wait_for(self, answer: Path, process: subprocess.Popen[bytes], seconds: float) -> dict[str, Any]:
@@ -189,8 +200,9 @@ class ChildProcess:
                 if has_no_space(self._folder):
                     raise disk_full_error(f"{self._folder}: the folder for temporary files is full")
                 reason = f"its process {_describe_exit(process.returncode)}{self._printed()}"
+                killed_at_start = self._n_calls == 0 and process.returncode < 0
                 self._forget()
-                raise ChildError(reason, may_retry=used_before)
+                raise ChildError(reason, may_retry=used_before or killed_at_start)
             if self.is_ended():
                 self.kill()
                 raise BatchEndedError

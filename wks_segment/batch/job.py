@@ -11,6 +11,11 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from ..core.files.whole_file import UNFINISHED_PREFIX
+
+SCENE = "--output"
+"""Option of the file of a scene."""
+
 
 @dataclass(frozen=True)
 class Job:
@@ -38,10 +43,28 @@ class Job:
     outputs: Mapping[str, str]
     key: str
 
-    def arguments_for(self, folder: Path) -> list[str]:
-        """Arguments of the command line that make it write its outputs to a folder."""
+    def arguments_for(self, folder: Path, place: Path | None) -> list[str]:
+        """Arguments of the command line that make it write its outputs to a folder.
+
+        Parameters
+        ----------
+        folder : path
+            Its name begins with the job's key.
+        place : path or None
+            Result of `place_of_scene`.
+        """
         outputs = [f"{option}={folder / path}" for option, path in self.outputs.items()]
+        if place is not None:
+            outputs.append(f"--unfinished={place / UNFINISHED_PREFIX}{folder.name}")
         return [self.command, self.input, *self.arguments, *outputs]
+
+    def place_of_scene(self, batch_folder: Path) -> Path | None:
+        """Folder for the file of the scene; None if the job writes none.
+
+        It is written there, then moved to the folder of unfinished results, then moved back: Blender stores where
+        images and libraries are relative to the folder in which it writes.
+        """
+        return (batch_folder / self.outputs[SCENE]).parent if SCENE in self.outputs else None
 
 
 @dataclass(frozen=True)

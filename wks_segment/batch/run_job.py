@@ -28,7 +28,7 @@ def run_job(job: Job, child: ChildProcess, seconds: float, unfinished: Path) -> 
     seconds : float
         Time limit.
     unfinished : path
-        Folder in which a new folder is made for the results.
+        Folder in which a new folder is made for the results; two levels below the folder of the batch.
 
     Raises
     ------
@@ -45,7 +45,10 @@ def run_job(job: Job, child: ChildProcess, seconds: float, unfinished: Path) -> 
     try:
         for path in job.outputs.values():
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        result, reason, disk_full = _call(job, child, seconds, folder)
+        place = job.place_of_scene(unfinished.parents[1])
+        if place is not None:
+            place.mkdir(parents=True, exist_ok=True)
+        result, reason, disk_full = _call(child, job.arguments_for(folder, place), seconds)
         if result is None and (disk_full or has_no_space(folder)):
             raise disk_full_error(reason.replace(f"{folder}/", ""))
         missing = [path for path in job.outputs.values() if not (folder / path).is_file()]
@@ -68,9 +71,8 @@ def run_job(job: Job, child: ChildProcess, seconds: float, unfinished: Path) -> 
     )  # fmt: skip
 
 
-def _call(job: Job, child: ChildProcess, seconds: float, folder: Path) -> Answer:
-    """Answer of a child to a job; asked again if the first process ended after it had run other jobs."""
-    arguments = job.arguments_for(folder)
+def _call(child: ChildProcess, arguments: list[str], seconds: float) -> Answer:
+    """Answer of a child to a call; asked again if the first process ended after it had answered others."""
     try:
         return child.call(arguments, seconds)
     except ChildError as error:

@@ -33,7 +33,8 @@ def silent(unless_it_fails: bool = False) -> Iterator[None]:
         Print it on standard error if the block raises an error.
     """
     flush_streams()
-    with tempfile.TemporaryFile() as held:
+    # No file if nobody reads it: Blender ends the process if it cannot print, as on a full disk.
+    with tempfile.TemporaryFile() if unless_it_fails else open(os.devnull, "r+b") as held:
         originals = {stream: os.dup(stream) for stream in STREAMS}
         for stream in STREAMS:
             os.dup2(held.fileno(), stream)

@@ -12,14 +12,12 @@ from dataclasses import replace
 from os import PathLike
 from typing import Any, Literal
 
-from sklearn.base import BaseEstimator
-
 from . import model_file
 from .labeling.pose_labeling import PoseLabeling
 from .labeling.region_atlas import RegionAtlas
 from .learning.gaussian_mixture import CovarianceType
 from .learning.likelihood import comparable_score, usual_scores
-from .learning.parameters import PARAMETERS, NSegments, Preset, check_parameters, effective
+from .learning.parameters import Estimator, NSegments, Preset, check_parameters, effective
 from .learning.part_mixture import PartMixture, learn_parts
 from .learning.standardizer import Scaling, Standardizer
 from .learning.training_samples import TrainingSamples
@@ -46,7 +44,7 @@ MERGING_ROUNDS = 6
 """Most times that regions are found, each time without a segment that was found nowhere."""
 
 
-class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # scikit-learn has no types
+class PoseSegmentation(PoseLabeling, Estimator):
     """Learns the segments of a character from several poses and finds them in any pose.
 
     An estimator as scikit-learn has them: parameters are checked by `fit`, whose results are attributes with a trailing
@@ -180,7 +178,7 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
         meshes = as_list(meshes, "meshes")
         if not meshes:
             raise ValueError("there is no pose to learn from: pass at least one mesh, better three to five")
-        overall, parameters = Progress.of(progress), self._parameters()
+        overall, parameters = Progress.of(progress), self.get_params()
         poses, described = self._all_described(meshes, overall, cache)
         overall = overall.part(described, 1.0)
         overall(0.0, "parts")
@@ -303,7 +301,7 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
             atlases = self.regions_, self.sides_
         return model_file.encode(
             model_file.ModelContent(
-                self._parameters(), learned, self.standardizer_,
+                self.get_params(), learned, self.standardizer_,
                 atlases, self.usual_scores_, self.part_notes_,
             )
         )  # fmt: skip
@@ -366,15 +364,12 @@ class PoseSegmentation(PoseLabeling, BaseEstimator):  # type: ignore[misc]  # sc
             learned = replace(learned, grouping=learned.grouping.without(lost[-1], labeler.n_segments))
         return learned, atlases
 
-    def _parameters(self) -> dict[str, Any]:
-        return {name: getattr(self, name) for name in PARAMETERS}
-
     def _check_parameters(self) -> None:
-        check_parameters(self._parameters())
+        check_parameters(self.get_params())
 
     def _effective(self, name: str) -> Any:
         """Value of a parameter after the preset."""
-        return effective(self._parameters(), name)
+        return effective(self.get_params(), name)
 
     def _laplacian(self) -> Literal["auto"] | Laplacian:
         laplacian: Literal["auto"] | Laplacian = self._effective("laplacian")

@@ -4,8 +4,10 @@ import json
 import os
 import shutil
 import sys
+import wave
 from pathlib import Path
 
+import bpy
 import pytest
 from command_line import QUICK, lines, run, start, wait_for_lines, write
 
@@ -56,6 +58,7 @@ def test_apply_writes_scenes_and_pictures(command, learned, characters, tmp_path
     assert len(list((tmp_path / "cache").glob("*.npz"))) == 3
     page = (tmp_path / "out" / "report.html").read_text()
     assert 'src="thumbnails/1.png"' in page
+    assert list(bpy.data.images.load(str(tmp_path / "out" / "thumbnails" / "1.png")).size) == [320, 320]
 
 
 def test_the_best_of_several_models_is_found_and_applied(command, learned, characters, tmp_path):
@@ -96,6 +99,49 @@ def test_a_folder_of_models_that_does_not_exist(command, characters, tmp_path):
     done = command("batch", "rank", characters, "--output", tmp_path / "no", "--models", tmp_path / "nowhere")
     assert done.code == 1
     assert "nowhere: there is no such folder" in done.err
+
+
+def test_relative_paths_in_a_scene_lead_to_the_same_files(command, learned, characters, tmp_path):
+    """From the place of the result, also where that is in a folder of its own, and whatever Blender saves there."""
+    inputs, out = tmp_path / "in", tmp_path / "out"
+    (inputs / "inner").mkdir(parents=True)
+    for folder in (inputs, inputs / "inner"):
+        save_with_relative_paths(characters / "0.obj", folder)
+    common = ("--model", learned[0] / "0.json", "--processes", 1, "--no-thumbnails")
+    done = command("batch", "apply", inputs / "**" / "hero.blend", "--output", out, *common)
+    assert done.code == 0, done
+    for folder in (inputs, inputs / "inner"):
+        bpy.ops.wm.open_mainfile(filepath=str(out / folder.relative_to(inputs) / "hero.blend"))
+        paths = bpy.utils.blend_paths()
+        assert len(paths) == 3
+        assert all(path.startswith("//") for path in paths)
+        found = {os.path.normpath(bpy.path.abspath(path)) for path in paths}
+        assert found == {str(folder / name) for name in ("skin.png", "library.blend", "sound.wav")}
+        assert "Shared" in bpy.data.materials
+    left = {path.name for path in out.rglob("*") if path.is_file()}
+    assert left == {"hero.blend", "batch.jsonl", "report.html"}
+
+
+def save_with_relative_paths(mesh, folder):
+    """Save a character with an image, a library and a sound beside it."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.data.materials.new("Shared").use_fake_user = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "library.blend"), copy=True)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "hero.blend"))
+    bpy.ops.wm.obj_import(filepath=str(mesh))
+    with bpy.data.libraries.load("//library.blend", link=True, relative=True) as (_, target):
+        target.materials = ["Shared"]
+    bpy.context.object.data.materials.append(bpy.data.materials["Shared"])
+    skin = bpy.data.images.new("skin", 4, 4)
+    skin.filepath_raw, skin.file_format = str(folder / "skin.png"), "PNG"
+    skin.save()
+    skin.filepath, skin.use_fake_user = "//skin.png", True
+    with wave.open(str(folder / "sound.wav"), "wb") as sound:
+        sound.setparams((1, 2, 8000, 8, "NONE", ""))
+        sound.writeframes(bytes(16))
+    bpy.data.sounds.load("//sound.wav").use_fake_user = True
+    bpy.ops.wm.save_mainfile()
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")

@@ -110,10 +110,14 @@ def test_library_of_the_system_that_is_missing(tmp_path):
 
 
 @pytest.mark.usefixtures("needs_rendering")
-def test_a_pipe_gets_one_line_for_each_stage(folder, tmp_path):
-    picture = tmp_path / "poses.png"
-    done = python(["-m", "wks_segment"], "segment", folder / "walker.glb", "--frames", 3, *QUICK, "--render", picture)
-    assert (done.returncode, picture.is_file()) == (0, True)
+@pytest.mark.parametrize("suffix", [".blend", ".glb", ".obj"])
+def test_a_pipe_gets_one_line_for_each_stage(folder, tmp_path, suffix):
+    picture, scene = tmp_path / "poses.png", tmp_path / f"scene{suffix}"
+    done = python(
+        ["-m", "wks_segment"], "segment", folder / "walker.glb", "--frames", 3, *QUICK, "--render", picture,
+        "--output", scene,
+    )  # fmt: skip
+    assert (done.returncode, picture.is_file(), scene.is_file()) == (0, True, True)
     lines = done.stderr.splitlines()
     stages = [line.partition(" %  ")[2] for line in lines]
     assert all(stages), f"other lines than of stages:\n{done.stderr}"

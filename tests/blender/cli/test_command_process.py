@@ -115,14 +115,15 @@ def test_process_that_is_interrupted_while_blender_starts(folder, number):
 
 
 @needs_signals
-def test_terminated_batch_prints_one_json_object(folder, tmp_path):
+@pytest.mark.parametrize("number", ENDS)
+def test_interrupted_batch_prints_one_json_object(folder, tmp_path, number):
     running = process(
         "batch", "learn", folder, "--frames", 20, "--output", tmp_path / "out", "--json", **HEEDS_SIGNALS
     )  # fmt: skip
     for line in running.stderr:
         if "0 of" in line:
             break
-    running.send_signal(signal.SIGTERM)
+    running.send_signal(number)
     done = ended(running)
-    assert list(done.result) == ["error"]
+    check_interrupted(done, number)
     assert "--resume" in done.result["error"]

@@ -32,7 +32,7 @@ def test_share_of_each_stage(settings, learns_anew):
     cache = MemoryCache()
     first = SegmentationJob.learning(bpy.context, cache)
     reports = reports_of(first)
-    assert 0.5 < first_of("Learning", reports) < 0.9, "signatures take most of the time"
+    assert 0.05 < first_of("Learning", reports) < 0.3, "signatures of so few eigenpairs take little time"
     assert first_of("Labels", reports) > 0.9
     again = reports_of(SegmentationJob.learning(bpy.context, cache))
     assert first_of("Learning", again) == 0
@@ -50,7 +50,7 @@ def test_share_of_labels_with_a_given_model(settings):
     job.write()
     select(shown[1])
     cache = MemoryCache()
-    assert first_of("Labels", reports_of(SegmentationJob.applying(bpy.context, cache))) > 0.9
+    assert first_of("Labels", reports_of(SegmentationJob.applying(bpy.context, cache))) > 0.5
     known = reports_of(SegmentationJob.applying(bpy.context, cache))
     assert first_of("Labels", known) < 0.7
     # The bar cannot be far from the time where no large step follows.

@@ -14,6 +14,7 @@ from ...core import DiskCache
 from ...core.poses.signature_cache import DISK
 from ..errors import UserError
 from ..props.settings import WKSSegmentSettings
+from ..render.contact_sheet import TILE_PIXELS
 from ..scene import file_formats
 from .option_types import frame_range, named_path, number_or_auto, number_within, several_of
 
@@ -93,7 +94,12 @@ def add_outputs(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--output", type=named_path, help=f"write the scene to this file ({', '.join(file_formats.EXPORTERS)})"
     )
+    parser.add_argument("--unfinished", type=named_path, help=argparse.SUPPRESS)  # for batches: see `Job`
     parser.add_argument("--render", type=named_path, metavar="PNG", help="write a picture of all poses side by side")
+    parser.add_argument(
+        "--tile", type=number_within(int, 32, 4096), default=TILE_PIXELS, metavar="PIXELS",
+        help=f"width and height of each pose in the picture (default: {TILE_PIXELS})",
+    )  # fmt: skip
     add_output_settings(parser)
 
 

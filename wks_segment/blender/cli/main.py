@@ -11,6 +11,7 @@ import traceback
 from functools import cache
 from typing import Any, NoReturn
 
+from ... import __version__
 from ...batch import CHILD_COMMAND, Answer, serve
 from ...core.files.whole_file import is_disk_full
 from ...core.progress import Progress
@@ -149,6 +150,7 @@ def answer(arguments: list[str]) -> Answer:
 @cache  # it takes 25 ms, as long as the rest of a refused file in a batch
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="wks_segment", description="The same parts, labels and colors in every pose of a character.")
+    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for module in COMMAND_MODULES:
         module.add(commands)

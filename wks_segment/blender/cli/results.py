@@ -60,7 +60,7 @@ def label_and_write(
         with run.report.stage("render"):
             merged_into = settings.notes().joined
             tiles = [Tile(pose, merge_parts(labels[pose.character], merged_into), pose.name) for pose in poses]
-            render_poses(tiles, options.render, style=settings.style())
+            render_poses(tiles, options.render, style=settings.style(), pixels=options.tile)
 
 
 def save_model(model: PoseSegmentation, path: Path) -> None:

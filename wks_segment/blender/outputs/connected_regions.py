@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 from scipy.spatial import cKDTree
 
 from ...core.mesh.triangle_mesh import FloatArray, IntArray, connected_groups
@@ -85,7 +85,7 @@ def _numbered_like(character: Character, regions: IntArray, other: Character, kn
         places, known_places = _places(character, regions, count), _places(other, known, n_known)
         cost = np.linalg.norm(places[:, None] - known_places, axis=2)
     number = np.full(count, -1)
-    rows, columns = linear_sum_assignment(cost)
+    rows, columns = scipy.optimize.linear_sum_assignment(cost)
     number[rows] = columns
     number[number < 0] = n_known + np.arange((number < 0).sum())
     return np.where(regions < 0, -1, number[regions])

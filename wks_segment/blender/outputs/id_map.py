@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from scipy.ndimage import distance_transform_edt
+import scipy
 
 from ...core.files.whole_file import incomplete, whole_file
 from ...core.mesh.triangle_mesh import IntArray
@@ -50,7 +50,7 @@ class IdMapImage:
 def with_margin(part_map: IntArray, margin: int) -> IntArray:
     """A (size, size) map of parts, where pixels without a part take the nearest one within so many pixels."""
     empty = part_map == NO_PART
-    distance, nearest = distance_transform_edt(empty, return_indices=True)
+    distance, nearest = scipy.ndimage.distance_transform_edt(empty, return_indices=True)
     return np.where(distance <= margin, part_map[tuple(nearest)], NO_PART)
 
 

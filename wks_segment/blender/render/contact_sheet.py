@@ -26,7 +26,7 @@ from ..scene.poses import Pose
 from ..streams import silent
 
 TILE_PIXELS = 480
-"""Width and height of the tile of a pose, in pixels."""
+"""Usual width and height of the tile of a pose, in pixels. Without a graphics card, time grows with their number."""
 TILES_IN_ROW = 4
 VIEW_DIRECTION = Vector((-0.85, -1.0, 0.45))
 """Direction from the poses to the camera: front left and slightly above, for a character that faces −Y."""
@@ -54,8 +54,10 @@ class Tile:
     caption: str
 
 
-def render_poses(tiles: Sequence[Tile], path: Path, columns: int = TILES_IN_ROW, style: Style = PLAIN) -> None:
-    """Render poses to one PNG file, with `columns` tiles in a row, in the colors of a style.
+def render_poses(
+    tiles: Sequence[Tile], path: Path, columns: int = TILES_IN_ROW, style: Style = PLAIN, pixels: int = TILE_PIXELS
+) -> None:
+    """Render poses to one PNG file, with `columns` tiles of so many pixels in a row, in the colors of a style.
 
     All poses of a character have one scale, and each character fills its tiles.
 
@@ -84,7 +86,7 @@ def render_poses(tiles: Sequence[Tile], path: Path, columns: int = TILES_IN_ROW,
             _add_pose(scene, (points - middle) / sizes[tile.pose.character] + place, tile, style)
             _add_caption(scene, tile.caption, place)
         _add_camera(scene, columns, rows)
-        render(scene, path, TILE_PIXELS * columns, TILE_PIXELS * rows)
+        render(scene, path, pixels * columns, pixels * rows)
 
 
 @contextmanager

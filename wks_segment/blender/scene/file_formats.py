@@ -172,14 +172,27 @@ def check_folder(path: Path) -> None:
         raise UserError("{path}: this is a folder, give the name of a file", path=path)
 
 
-def save_scene(path: Path) -> None:
-    """Write the scene to a file, which appears whole; UserError if it cannot be written."""
+def save_scene(path: Path, first: Path | None = None) -> None:
+    """Write the scene to a file, which appears whole.
+
+    Parameters
+    ----------
+    path : path
+    first : path, optional
+        Where the file is written before it is moved to `path`, without its suffix. Blender stores where images,
+        libraries and caches are relative to the folder in which it writes.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be written.
+    """
     suffix = path.suffix.lower()
     try:
         if suffix == ".obj":
-            _save_obj(path)
+            _save_obj(path, first)
         else:
-            with whole_file(path, check_complete) as unfinished:
+            with whole_file(path, check_complete, first=first) as unfinished:
                 _export(unfinished)
     except OSError as error:
         raise not_written(path, error) from error
@@ -187,7 +200,8 @@ def save_scene(path: Path) -> None:
 
 def _export(path: Path) -> None:
     try:
-        EXPORTERS[path.suffix.lower()](str(path))
+        with silent():
+            EXPORTERS[path.suffix.lower()](str(path))
     except RuntimeError as error:
         if path.suffix.lower() == ".blend" and not path.exists() and _is_larger_than_space(path.parent):
             raise no_space(path) from error
@@ -206,11 +220,11 @@ def _is_larger_than_space(folder: Path) -> bool:
     return False
 
 
-def _save_obj(path: Path) -> None:
-    """Write the scene to an .obj file, and its materials to an .mtl file beside it."""
+def _save_obj(path: Path, first: Path | None) -> None:
+    """Write the scene to an .obj file, and its materials to an .mtl file beside it; see `save_scene`."""
     objects = bpy.context.evaluated_depsgraph_get().objects
     n_faces = sum(len(obj.data.polygons) for obj in objects if obj.type == "MESH")
-    with whole_file(path, lambda written: check_obj(written, n_faces), beside=[".mtl"]) as unfinished:
+    with whole_file(path, lambda written: check_obj(written, n_faces), [".mtl"], first) as unfinished:
         _export(unfinished)
         # It speaks of its materials by the name that their file has for now.
         library, final = (b"mtllib " + os.fsencode(name) + b".mtl\n" for name in (unfinished.stem, path.stem))

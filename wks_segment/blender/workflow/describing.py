@@ -18,7 +18,7 @@ from ...core import (
     connect,
 )
 from ...core.message import Message, message_of
-from ...core.poses.describe import LABELING, describing_share
+from ...core.poses.describe import LABELING, Duration
 from ...core.progress import Progress
 from ..errors import UserError
 from ..scene.poses import Pose
@@ -69,9 +69,10 @@ class Prepared:
     connections: dict[int, Connection]
     known: dict[int, PoseSignature | None]
 
-    def describing_share(self, rest: float) -> float:
-        """Share of the time of a job that is spent on signatures; see `core.poses.describe`."""
-        return describing_share(list(self.known.values()).count(None), len(self.originals), rest)
+    def describing_share(self, model: PoseSegmentation, poses: Sequence[Pose], rest: Duration) -> float:
+        """Share of the time of a job that is spent on signatures; see `PoseDescriber.describing_share`."""
+        new = [poses[i].mesh for i, signature in self.known.items() if signature is None]
+        return model.describing_share(new, len(poses), rest)
 
 
 def prepare(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> Prepared:
@@ -115,7 +116,7 @@ def describe(
 def describe_to_label(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> tuple[list[Workpiece], Progress]:
     """`describe` for a job that labels the poses next, and the progress that is left for that."""
     prepared = prepare(model, poses, run)
-    share = prepared.describing_share(LABELING)
+    share = prepared.describing_share(model, poses, LABELING)
     described = describe(model, poses, run.with_progress(run.progress.part(0.0, share)), prepared)
     return described, run.progress.part(share, 1.0)
 

@@ -110,7 +110,7 @@ def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[Work
             segments=model.n_segments,
         )
     prepared = prepare(model, poses, run)
-    share = prepared.describing_share(LEARNING)
+    share = prepared.describing_share(model, poses, LEARNING)
     described = describe(model, poses, run.with_progress(run.progress.part(0.0, share)), prepared)
     progress = run.progress.part(share, 1.0).titled("Learning the segments")
     with run.report.stage("mixture"):

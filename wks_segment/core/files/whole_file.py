@@ -29,9 +29,10 @@ INCOMPLETE = "it was written incompletely: is the disk full, or its quota used u
 
 @contextmanager
 def whole_file(
-    path: str | os.PathLike[str], check: Callable[[Path], None] | None = None, beside: Sequence[str] = ()
-) -> Iterator[Path]:
-    """Path of a new file in the same folder, to be written by the block, which then takes the place of `path`.
+    path: str | os.PathLike[str], check: Callable[[Path], None] | None = None, beside: Sequence[str] = (),
+    first: Path | None = None,
+) -> Iterator[Path]:  # fmt: skip
+    """Path of a new file, to be written by the block, which then takes the place of `path`.
 
     If the block or the check raises an error, what was there stays as it was, and nothing else is left behind.
 
@@ -42,6 +43,8 @@ def whole_file(
         Called with the new file; raises an error if it is not complete.
     beside
         Suffixes of further files that the block may write beside the new one under the same name; they are moved, too.
+    first : path, optional
+        Path of the new file, without its suffix, on the same disk; by default in the folder of `path`.
 
     Raises
     ------
@@ -51,7 +54,8 @@ def whole_file(
     target = Path(path).resolve()
     if target.exists() and not os.access(target, os.W_OK):
         raise PermissionError(Message("{path} is write-protected", path=target))
-    unfinished = target.with_name(f"{UNFINISHED_PREFIX}{uuid.uuid4().hex[:12]}{target.suffix}")
+    first = target.with_name(f"{UNFINISHED_PREFIX}{uuid.uuid4().hex[:12]}") if first is None else first.resolve()
+    unfinished = first.with_name(f"{first.name}{target.suffix}")
     try:
         yield unfinished
         if check is not None:
@@ -66,7 +70,7 @@ def whole_file(
     except BaseException as error:
         if isinstance(error, OSError):
             _name_target(error, unfinished, target)
-        for left in target.parent.glob(f"{unfinished.stem}*"):
+        for left in first.parent.glob(f"{first.name}*"):
             with suppress(OSError):
                 left.unlink()
         raise

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 from scipy.spatial.distance import cdist
 
 from ..mesh.triangle_mesh import FloatArray, IntArray
@@ -72,7 +72,7 @@ class _Matching:
     def assign(self, segment: int) -> None:
         """Match the regions of a segment at the lowest cost."""
         columns = self._columns[segment]
-        best_rows, best_columns = linear_sum_assignment(self.costs(segment))
+        best_rows, best_columns = scipy.optimize.linear_sum_assignment(self.costs(segment))
         self.match[columns] = -1
         self.match[columns[best_columns]] = self._rows[segment][best_rows]
 
@@ -102,12 +102,12 @@ def _margin(costs: FloatArray) -> float:
     """Difference in cost between the best assignment and the second best."""
     if min(costs.shape) == 0:
         return np.inf
-    rows, columns = linear_sum_assignment(costs)
+    rows, columns = scipy.optimize.linear_sum_assignment(costs)
     best = costs[rows, columns].sum()
     alternatives = []
     for i, j in zip(rows, columns, strict=True):
         without = costs.copy()
         without[i, j] = IMPOSSIBLE
-        other_rows, other_columns = linear_sum_assignment(without)
+        other_rows, other_columns = scipy.optimize.linear_sum_assignment(without)
         alternatives.append(without[other_rows, other_columns].sum())
     return float(min(alternatives) - best)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
-from sklearn.exceptions import NotFittedError
 
 from ..learning.gaussian_mixture import GaussianMixture
 from ..learning.merge_tree import MergeTree
@@ -172,6 +171,8 @@ class PoseLabeling(PoseDescriber):
 
     def _fitted(self) -> GaussianMixture:
         if not self.__sklearn_is_fitted__():
+            from sklearn.exceptions import NotFittedError  # takes long to import
+
             raise NotFittedError("the model is not fitted: call fit, or load a model, first")
         return self.mixture_
 

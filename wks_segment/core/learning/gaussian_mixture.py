@@ -15,8 +15,6 @@ from typing import Literal, get_args
 import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
-from sklearn.cluster import KMeans
-from sklearn.exceptions import ConvergenceWarning
 
 from ..mesh.triangle_mesh import FloatArray, IntArray
 from ..message import Message
@@ -190,6 +188,10 @@ def fit_mixture(
 
 def _k_means(samples: FloatArray, shares: FloatArray, n_clusters: int, seed: int) -> FloatArray:
     """(n, K) responsibilities, 0 or 1, by k-means; TooFewSamplesError if there are too few distinct samples."""
+    # Only the paper's setting and `fit_mixture` need it, and it takes long to import.
+    from sklearn.cluster import KMeans
+    from sklearn.exceptions import ConvergenceWarning
+
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)  # about too few distinct samples: the error below says it
         cluster = KMeans(n_clusters, n_init=1, random_state=seed).fit_predict(samples, sample_weight=shares)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.cluster.hierarchy import linkage
+import scipy
 
 from ..geometry.agglomeration import merge_in_table
 from ..mesh.triangle_mesh import FloatArray, IntArray
@@ -179,7 +179,7 @@ def _merged_inside(
     steps: list[tuple[float, tuple[int, int]]] = []
     for k in range(n_kinds):
         names = np.flatnonzero(kind == k).tolist()
-        tree: Sequence[FloatArray] = linkage(places[names], "ward") if len(names) > 1 else ()
+        tree: Sequence[FloatArray] = scipy.cluster.hierarchy.linkage(places[names], "ward") if len(names) > 1 else ()
         for first, second, height, _ in tree:
             kept, gone = sorted((names[int(first)], names[int(second)]), key=lambda name: (-weights[name], name))
             weights[kept] += weights[gone]

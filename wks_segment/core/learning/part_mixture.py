@@ -13,8 +13,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from sklearn.cluster import KMeans
-from sklearn.exceptions import ConvergenceWarning
 
 from ..mesh.surface import shares_at_vertices
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray, TriangleMesh
@@ -35,6 +33,7 @@ from .gaussian_mixture import (
     squares_of,
     variance_floor,
 )
+from .k_means import k_means
 from .merge_tree import MergeTree
 from .parameters import effective, least_segments
 from .standardizer import Standardizer
@@ -255,11 +254,7 @@ def _clusters(places: FloatArray, shares: FloatArray, count: int) -> IntArray:
     starts = np.array(
         [np.average(places[halves == i], axis=0, weights=shares[halves == i]) for i in range(halves.max() + 1)]
     )
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ConvergenceWarning)  # about too few distinct places
-        found = KMeans(len(starts), init=starts, n_init=1, max_iter=K_MEANS_ROUNDS).fit_predict(
-            places, sample_weight=shares
-        )
+    found = k_means(places, shares, starts, K_MEANS_ROUNDS)
     return np.unique(found, return_inverse=True)[1].ravel()
 
 

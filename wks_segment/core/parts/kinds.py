@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.spatial.distance import squareform
 
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
@@ -171,8 +171,8 @@ def _repeats(evidence: Evidence, signature: FloatArray, graph: PartGraph) -> Int
     central = np.diagonal(mirrored)
     distance[central] = distance[:, central] = NO_REPEAT
     np.fill_diagonal(distance, 0)
-    tree = linkage(squareform(distance, checks=False), "average")
-    return np.asarray(fcluster(tree, SAME_KIND, "distance") - 1, dtype=np.int64)
+    tree = scipy.cluster.hierarchy.linkage(squareform(distance, checks=False), "average")
+    return np.asarray(scipy.cluster.hierarchy.fcluster(tree, SAME_KIND, "distance") - 1, dtype=np.int64)
 
 
 def _kinds_of_bodies(graphs: Sequence[PartGraph], count: int) -> list[IntArray]:
@@ -185,7 +185,8 @@ def _kinds_of_bodies(graphs: Sequence[PartGraph], count: int) -> list[IntArray]:
     places = np.column_stack([offset / unit, SIZE_WEIGHT * np.log(areas + LEAST_SIZE)]) * areas[:, None] ** 0.25
     kind = np.zeros(len(areas), dtype=np.int64)
     if len(areas) > 1:
-        kind = np.asarray(fcluster(linkage(places, "ward"), count, "maxclust") - 1, dtype=np.int64)
+        tree = scipy.cluster.hierarchy.linkage(places, "ward")
+        kind = np.asarray(scipy.cluster.hierarchy.fcluster(tree, count, "maxclust") - 1, dtype=np.int64)
     return np.split(kind, np.cumsum([len(graph.regions) for graph in graphs])[:-1])
 
 

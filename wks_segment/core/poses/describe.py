@@ -8,7 +8,9 @@ import warnings
 from collections.abc import Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
 from functools import partial
-from typing import Literal
+from typing import Literal, NamedTuple
+
+import numpy as np
 
 from ..mesh.surface import Connection, IslandMode, connect, connect_alike, prepare_surface
 from ..mesh.triangle_mesh import TriangleMesh
@@ -37,24 +39,25 @@ SIGNATURE_BYTES = 16
 
 SURFACE = 0.06
 """Share of the time of a pose after which its surface is prepared."""
-LEARNING, LABELING = 0.4, 0.07
-"""Time to learn from a pose, and to label one with a given model, in units of the time of its signature: medians of ten
-characters, of which the signature is between half and nine tenths of the time."""
 
 
-def describing_share(n_new: int, n_poses: int, rest: float) -> float:
-    """Share of the time of a job that is spent on signatures.
+class Duration(NamedTuple):
+    """Seconds of a processor for a job, for each of its poses, and for each vertex of a refined pose."""
 
-    Parameters
-    ----------
-    n_new : int
-        Number of poses whose signature must be computed.
-    n_poses : int
-        Number of all poses of the job.
-    rest : float
-        Time of the rest of the job for each pose, in units of the time of a signature.
-    """
-    return n_new / (n_new + rest * n_poses)
+    job: float
+    pose: float
+    vertex: float
+
+    def of(self, n_poses: int, n_vertices: float) -> float:
+        """Seconds for poses that have so many vertices on average."""
+        return self.job + n_poses * (self.pose + self.vertex * n_vertices)
+
+
+LEARNING, LABELING = Duration(0.5, 0.25, 7e-5), Duration(0.0, 0.02, 2.4e-5)
+"""To learn from described poses, and to label them with a given model, which is within a third of what `python -m
+benchmarks.progress` measures."""
+SIGNATURE_START, SIGNATURE_FACTOR = 0.05, 1.35
+"""Seconds of a signature: a constant, and a multiple of the estimate of its eigenpairs; from the same measurement."""
 
 
 class PoseDescriber:
@@ -138,6 +141,25 @@ class PoseDescriber:
             "accuracy": self.accuracy,
             "laplacian": self._laplacian(),
         }
+
+    def describing_share(self, new: Sequence[TriangleMesh], n_poses: int, rest: Duration) -> float:
+        """Share of the time of a job that is spent on signatures.
+
+        Parameters
+        ----------
+        new
+            The poses whose signature must be computed.
+        n_poses : int
+            Number of all poses of the job.
+        rest : Duration
+            Of the rest of the job.
+        """
+        if not new:
+            return 0.0
+        sizes = [self._n_refined(mesh) for mesh in new]
+        seconds = sum(seconds_needed(size, self.n_eigenpairs, self.accuracy) for size in sizes)
+        signatures = SIGNATURE_START * len(new) + SIGNATURE_FACTOR * seconds
+        return signatures / (signatures + rest.of(n_poses, float(np.mean(sizes))))
 
     @one_blas_thread  # poses run in parallel instead: matrices this narrow gain nothing from more threads
     def describe_all(
@@ -274,7 +296,8 @@ class PoseDescriber:
         names = [Message("pose {number}", number=i + 1) for i in range(len(bare))]
         connections = connect_alike(bare, names, self.pieces)
         known = self.known_signatures(bare, connections, cache)
-        share = describing_share(known.count(None), len(meshes), LEARNING)
+        unknown = [mesh for mesh, signature in zip(bare, known, strict=True) if signature is None]
+        share = self.describing_share(unknown, len(meshes), LEARNING)
         part = progress.part(0.0, share)
         signatures = self.describe_all(bare, connections, part, cache=cache, known=known)
         described = dict(zip(new, signatures, strict=True))

@@ -79,7 +79,7 @@ def _apply(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
             run.report.warn(*([] if warning is None else [warning]))
     run.report.warn(*absent_warnings(model, run.report))
     if options.output:
-        file_formats.save_scene(options.output)
+        file_formats.save_scene(options.output, options.unfinished)
     return result_of(options, run.report) | verdict
 
 

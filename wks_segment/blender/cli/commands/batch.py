@@ -41,6 +41,11 @@ from ..option_types import batch_part, named, named_path, number_within
 
 TIME_LIMIT = 3600.0
 """Default of the seconds that a file may take."""
+THUMBNAIL = {"--render": "thumbnails/{}.png"}
+"""Option and file of a picture for the report."""
+TILE = ("--tile=320",)
+"""Pixels of each pose in it: the report shows fewer, and 480 would take as long as the rest of a small file, without a
+graphics card."""
 
 
 class JobTemplate(NamedTuple):
@@ -183,14 +188,15 @@ def _jobs(options: argparse.Namespace) -> list[Job]:
 
 
 def _learn_template(options: argparse.Namespace) -> JobTemplate:
-    outputs = {"--model": "{}.json"} | _thumbnail(options)
-    return JobTemplate("learn" if options.no_thumbnails else "segment", to_arguments(options), outputs, [])
+    if options.no_thumbnails:
+        return JobTemplate("learn", to_arguments(options), {"--model": "{}.json"}, [])
+    return JobTemplate("segment", [*to_arguments(options), *TILE], {"--model": "{}.json"} | THUMBNAIL, [])
 
 
 def _apply_template(options: argparse.Namespace) -> JobTemplate:
-    outputs = {"--output": "{}." + options.format} | _thumbnail(options)
+    outputs = {"--output": "{}." + options.format} | ({} if options.no_thumbnails else THUMBNAIL)
     argument, content = _models(options.model, options.models)
-    return JobTemplate("apply", [*to_arguments(options), argument], outputs, [content])
+    return JobTemplate("apply", [*to_arguments(options), *TILE, argument], outputs, [content])
 
 
 def _rank_template(options: argparse.Namespace) -> JobTemplate:
@@ -208,10 +214,6 @@ def _models(model: Path | None, folder: Path | None) -> tuple[str, str]:
     if not folder.is_dir():
         raise BatchError(f"{folder}: there is no such folder")
     return f"--models={folder.resolve()}", hash_models(folder)
-
-
-def _thumbnail(options: argparse.Namespace) -> dict[str, str]:
-    return {} if options.no_thumbnails else {"--render": "thumbnails/{}.png"}
 
 
 def _text(result: dict[str, Any]) -> str:

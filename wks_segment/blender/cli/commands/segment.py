@@ -57,5 +57,5 @@ def _segment(options: argparse.Namespace, progress: Progress) -> dict[str, Any]:
         label_and_write(model, poses, described, settings, options, rest)
         run.report.warnings += segment_warnings(model, run.report)
     if options.output:
-        file_formats.save_scene(options.output)
+        file_formats.save_scene(options.output, options.unfinished)
     return result_of(options, run.report)
