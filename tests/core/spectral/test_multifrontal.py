@@ -51,3 +51,16 @@ def test_unknowns_may_all_have_the_same_position():
     matrix = shifted(mesh, 100.0)
     solution = MultifrontalFactor(matrix, np.zeros((mesh.n_vertices, 3)), np.float64).solve(np.eye(mesh.n_vertices))
     np.testing.assert_allclose(matrix @ solution, np.eye(mesh.n_vertices), atol=1e-9)
+
+
+@pytest.mark.parametrize("mesh", MESHES, ids=IDS)
+@pytest.mark.parametrize(("dtype", "tolerance"), [(np.float64, 1e-11), (np.float32, 1e-4)])
+@pytest.mark.parametrize("width", [3, 200], ids=["narrow columns", "wide columns"])
+def test_the_inverse_is_compressed_to_sparse_columns(mesh, dtype, tolerance, width):
+    factor = MultifrontalFactor(shifted(mesh, 100.0), mesh.vertices, dtype)
+    row = np.arange(mesh.n_vertices)
+    right = csr_matrix((np.cos(row), (row, row // width)))
+    compressed = factor.compressed(right)
+    assert compressed.dtype == dtype
+    expected = right.T @ factor.solve(right.toarray())
+    np.testing.assert_allclose(compressed, expected, atol=tolerance * np.abs(expected).max())

@@ -28,7 +28,7 @@ from ..mesh.surface import Connection
 from ..mesh.triangle_mesh import TriangleMesh
 from .pose_signature import PoseSignature
 
-SIGNATURE_VERSION = 2
+SIGNATURE_VERSION = 3
 """To be raised whenever the same mesh and settings give another signature than before."""
 MEMORY = 1_000_000_000
 """Default limit of a cache in memory, in bytes: about 100 poses of 10,000 vertices."""

@@ -6,7 +6,7 @@ only rich enough; inverse iteration on the surface does the rest (`multilevel`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky
@@ -159,6 +159,17 @@ class Level:
         mass = csr_matrix(diags(masses.astype(np.float32)))
         return cls(mesh.vertices, graph_edges(stiffness), masses, stiffness, mass)
 
+    @property
+    def is_surface(self) -> bool:
+        """Whether this is the finest level, whose mass matrix is diagonal."""
+        return bool(self.mass.nnz == len(self.areas))
+
+    def in_double_precision(self) -> Level:
+        """The same level in float64; rows of S sum to 0, from which rounding to float32 had moved them."""
+        stiffness = self.stiffness.astype(np.float64)
+        stiffness = csr_matrix(stiffness - diags(np.asarray(stiffness.sum(axis=1)).ravel()))
+        return replace(self, stiffness=stiffness, mass=self.mass.astype(np.float64))
+
     def zero_modes(self) -> FloatArray:
         """(n, c) M-orthonormal constants in float32, one for each of c islands."""
         island = connected_groups(np.stack(self.edges, axis=1), len(self.areas))
@@ -176,6 +187,23 @@ class Level:
         """
         smoothed = wide or len(self.areas) < MANY_PER_CELL * n_cells
         reach = REACH_WIDE if wide else REACH_SMOOTHED if smoothed else REACH_PLAIN
+        prolongation, cell, middle, adjacent = self._functions_over_cells(n_cells, reach)
+        if smoothed:
+            inverse_diagonal = 1 / np.maximum(self.stiffness.diagonal(), np.finfo(np.float32).tiny)
+            prolongation = csr_matrix(
+                prolongation - diags(SMOOTHING_DAMPING * inverse_diagonal) @ (self.stiffness @ prolongation)
+            )
+        restricted = [csr_matrix(prolongation.T @ (full @ prolongation)) for full in (self.stiffness, self.mass)]
+        return prolongation, Level(
+            self.positions[middle], graph_edges(adjacent), _sums(self.areas, cell, len(middle)), *restricted
+        )
+
+    def functions_over_cells(self, n_cells: int) -> csr_matrix:
+        """(n, number of cells) sparse matrix of functions over about `n_cells` cells, as `coarsened` begins with."""
+        return self._functions_over_cells(n_cells, REACH_PLAIN)[0]
+
+    def _functions_over_cells(self, n_cells: int, reach: float) -> tuple[csr_matrix, IntArray, IntArray, csr_matrix]:
+        """Functions of cells that sum to 1; the cell of each vertex, the vertex in the middle of each, neighbors."""
         cell, count = cluster_vertices(self.positions, self.edges, self.areas, n_cells)
         middle = _middle_vertices(self.positions, self.areas, cell, count)
         adjacent = _adjacency(cell, count, self.edges)
@@ -190,16 +218,7 @@ class Level:
             )
             for start in range(0, len(cell), FIT_ROWS)
         ]
-        prolongation = csr_matrix(vstack(blocks, format="csr"))
-        if smoothed:
-            inverse_diagonal = 1 / np.maximum(self.stiffness.diagonal(), np.finfo(np.float32).tiny)
-            prolongation = csr_matrix(
-                prolongation - diags(SMOOTHING_DAMPING * inverse_diagonal) @ (self.stiffness @ prolongation)
-            )
-        restricted = [csr_matrix(prolongation.T @ (full @ prolongation)) for full in (self.stiffness, self.mass)]
-        return prolongation, Level(
-            self.positions[middle], graph_edges(adjacent), _sums(self.areas, cell, count), *restricted
-        )
+        return csr_matrix(vstack(blocks, format="csr")), cell, middle, adjacent
 
 
 def _moving_least_squares(

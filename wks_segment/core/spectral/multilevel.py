@@ -2,7 +2,8 @@
 
 A correction is one step of inverse iteration, x ← x − ω (S + shift M)⁻¹ (S x − λ M x), with the ω from 1 to 2 that
 lowers the Rayleigh quotient most. It needs few digits, so that single precision suffices, and its size estimates the
-error of a function. Functions are handed out in panels of columns: those of a large surface are never all in memory.
+error of a function. Where single precision does not suffice after all, the solve begins again in double precision.
+Functions are handed out in panels of columns: those of a large surface are never all in memory.
 
 Ours because no library for all platforms has anything comparable: 300 pairs on 100,000 vertices take SciPy's `eigsh`
 71 s and this solver 3.9 s, at an error of the signature of 0.2 to 0.4 % (docs/speed.md), which is less than remeshing
@@ -12,7 +13,8 @@ changes the exact signature (0.7 to 2.3 %). LOBPCG with algebraic multigrid did 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import LinAlgError
@@ -22,40 +24,36 @@ from ..mesh.triangle_mesh import FloatArray
 from ..message import Message
 from ..progress import Progress
 from .coarsening import Level, coarse_eigenpairs
-from .multifrontal import MultifrontalFactor, SingularError
-from .subspace import block_product, rayleigh_ritz
+from .multifrontal import SingularError
+from .smooth_space import ShiftedOperator, smooth_eigenpairs
+from .subspace import block_product, rayleigh_ritz, separate_low_values
 
-COARSE_CELLS_PER_PAIR, COARSE_CELLS_PER_PAIR_ABOVE = 4.0, 5.0
-"""Cells of the coarse space, which is solved densely, for each pair: up to `MORE_CELLS_ABOVE` vertices, and above."""
-MORE_CELLS_ABOVE = 40_000
-"""Number of vertices above which a second correction costs more than additional cells."""
+CELLS_PER_PAIR = 2.6
+"""Cells of the space of smooth functions, which is solved densely, for each pair."""
+WIDE_CELLS_PER_PAIR = 5.0
+"""Cells of the space of wide functions, for each pair: a second correction costs more than these."""
+WIDE_ABOVE = 60_000
+"""Number of vertices above which wide functions are tried first, as on cells: they need no second factorization, and on
+even shapes one correction suffices. Thin shapes need the smooth functions afterward."""
 SPARE_PAIRS, LEAST_SPARE = 0.1, 8
 """Additional pairs, as a fraction of the pairs that are asked for and as a number: a correction may change the order of
 pairs."""
 SHIFT_PER_PAIR = 0.5
 """Shift of the inverse for each pair that is asked for; a small shift would cost single precision its digits."""
-LARGEST_CHANGE, LARGEST_LATER_CHANGE = 0.07, 0.03
+LARGEST_CHANGE, LARGEST_LATER_CHANGE = 0.06, 0.03
 """Largest relative change of a function by its last correction: the remaining error is a small part of it, and the
 signature is within 0.2 to 0.6 % of the exact one. The second value holds after a correction that was larger."""
-LEAST_DIRECTION = 1e-5
-"""Squared size of a direction among the changes, relative to the largest, below which it is rounding."""
-LEAST_USEFUL_CHANGE = 0.01
-"""Least relative change of a function for which its change is added to the subspace."""
+LARGEST_OVERLAP = 0.01
+"""Largest overlap of two functions: the coarse space mixes those with almost the same eigenvalue, and a correction does
+not part them."""
 MAX_CORRECTIONS = 4
-"""Most corrections before the coarse space is refined."""
-LEAST_VALUE = 1e-6
-"""Fraction of the last eigenvalue below which the first one is rounding, or needs more digits than there are."""
-
-FACTORED, PREPARED, COARSE_SOLVED, CORRECTED, CERTAIN = 0.1, 0.35, 0.5, 0.53, 0.9
-"""Shares of the time of a solve after which the operator is factorized, the coarse space is made and solved, its
-functions are corrected, and the pairs are certain. In between, rounds enlarge the space and correct again. The dense
-coarse problem cannot report: it takes from 0.1 to 0.4 of the time if there are rounds, and from 0.2 to 0.9 if there are
-none, which shows only later."""
-LEFT_BY_ROUND, LEFT_BY_SLOW_ROUND, SLOW_CHANGE = 0.15, 0.45, 0.4
-"""Share of the time until the pairs are certain that a round leaves. Mostly one round suffices, and two to three if the
-first correction changes a hundredth of the functions by more than the last number: so on 10 of 11 characters."""
-ENLARGED = 0.95
-"""Share of the time of a round after which the space is enlarged; the correction is quick."""
+"""Most corrections before a coarse space with more cells is tried."""
+FACTORED, COARSE_SOLVED, CERTAIN = 0.1, 0.55, 0.9
+"""Shares of the time of a solve after which the operator is factorized, the coarse space is solved, and the pairs are
+certain."""
+FIRST_CORRECTION, ROUND = 0.4, 0.6
+"""Share of the time between the last two that the first correction takes, and share of the rest that each further round
+takes; most shapes need one or two."""
 CELL_LEVEL_ABOVE = 180_000
 """Number of vertices above which a level of cells is inserted between the coarse space and the surface. It has so many
 cells that its functions seldom need a correction on the surface."""
@@ -87,6 +85,16 @@ class NotConvergedError(ArithmeticError):
     """Corrections stay large, or single precision does not suffice."""
 
 
+@dataclass(frozen=True)
+class _Attempt:
+    """A way to solve: first pairs from a coarse space, the cells of that for each pair, precision, most corrections."""
+
+    start: Callable[[ShiftedOperator, int, int, int, Progress], tuple[FloatArray, FloatArray]]
+    cells_per_pair: float
+    double: bool = False
+    corrections: int = MAX_CORRECTIONS
+
+
 def multilevel_eigenpairs(
     level: Level, count: int, n_zero: int, progress: Progress
 ) -> tuple[FloatArray, Iterator[tuple[slice, FloatArray]]]:
@@ -114,12 +122,11 @@ def multilevel_eigenpairs(
     """
     try:
         if len(level.areas) <= CELL_LEVEL_ABOVE:
-            values, vectors = _solve(level, _Correction(level, count), count, n_zero, progress)
+            values, vectors = _solve(level, count, n_zero, progress)[1]
             return values, ((columns, vectors[:, columns]) for columns in panels(*vectors.shape))
         prolongation, cells = level.coarsened(MIDDLE_CELLS_PER_PAIR * count + n_zero)
         progress(0.3)
-        on_cells = _Correction(cells, count)
-        values, weights = _solve(cells, on_cells, count, n_zero, progress.part(0.3, 0.5))
+        on_cells, (values, weights) = _solve(cells, count, n_zero, progress.part(0.3, 0.5))
         change = _expected_change(level, prolongation, on_cells, values, weights)
         if not change <= LARGEST_CHANGE:
             raise NotConvergedError("the cells do not represent the functions of the surface")
@@ -131,45 +138,95 @@ def multilevel_eigenpairs(
 
 
 def _solve(
-    level: Level, correction: _Correction, count: int, n_zero: int, progress: Progress
-) -> tuple[FloatArray, FloatArray]:
-    """Eigenpairs from a coarse space, corrected on the level until corrections are small."""
-    per_pair = COARSE_CELLS_PER_PAIR_ABOVE if len(level.areas) > MORE_CELLS_ABOVE else COARSE_CELLS_PER_PAIR
-    n_cells = max(round(per_pair * count), 2 * (count + n_zero))
-    progress(FACTORED)
-    while 2 * n_cells < len(level.areas):
-        prolongation, cells = level.coarsened(n_cells, wide=True)
-        progress(PREPARED)
-        values, weights = coarse_eigenpairs(cells, n_zero, round((1 + SPARE_PAIRS) * count) + LEAST_SPARE)
-        if len(values) < count:
-            n_cells *= 2
+    level: Level, count: int, n_zero: int, progress: Progress
+) -> tuple[_Correction, tuple[FloatArray, FloatArray]]:
+    """Eigenpairs from a coarse space, corrected on the level until corrections are small, and what corrected them."""
+    reason: Exception | None = None
+    large = len(level.areas) > WIDE_ABOVE
+    attempts = [
+        _Attempt(_smooth_start, CELLS_PER_PAIR),
+        _Attempt(_smooth_start, 2 * CELLS_PER_PAIR, double=not large),  # of a large level, memory might not suffice
+    ]
+    if large or not level.is_surface:
+        attempts.insert(0, _Attempt(_wide_start, WIDE_CELLS_PER_PAIR, corrections=1))
+    n_pairs = round((1 + SPARE_PAIRS) * count) + LEAST_SPARE
+    corrections: dict[bool, _Correction] = {}
+    for attempt in attempts:
+        n_cells = max(round(attempt.cells_per_pair * count), 2 * (count + n_zero))
+        if n_cells >= len(level.areas):
             continue
-        vectors = block_product(prolongation, weights, FAST_COLUMNS)
-        progress(COARSE_SOLVED)
-        done, end = COARSE_SOLVED, CORRECTED
-        for step in range(MAX_CORRECTIONS):
-            changes = np.empty(len(values))
-            for columns in panels(len(vectors), len(values)):
-                panel = np.ascontiguousarray(vectors[:, columns])
-                values[columns], changes[columns] = correction(values[columns], panel)
-                vectors[:, columns] = panel
-                progress(done + (end - done) * columns.stop / len(values))
-            if not changes[:count].max() <= (LARGEST_LATER_CHANGE if step else LARGEST_CHANGE):
-                if step == 0:
-                    left = LEFT_BY_SLOW_ROUND if np.quantile(changes, 0.99) > SLOW_CHANGE else LEFT_BY_ROUND
-                begun, end = end, CERTAIN - left * (CERTAIN - end)
-                done = begun + ENLARGED * (end - begun)
-                values, vectors = _enlarged(correction, vectors, progress.part(begun, done))
-                continue
-            # The residual of a Ritz vector is orthogonal to all others, and so nearly is its correction.
-            order = np.argsort(values, kind="stable")[:count]
-            if values[order[0]] > LEAST_VALUE * values[order[-1]]:
-                progress(CERTAIN)
-                return values[order], vectors[:, order]
-            break
-        n_cells *= 2
+        try:
+            if attempt.double not in corrections:
+                precise = level.in_double_precision() if attempt.double else level
+                corrections = {attempt.double: _Correction(precise, count)}  # the former one is freed
+            correction = corrections[attempt.double]
+            progress(FACTORED)
+            pairs = attempt.start(correction.operator, n_cells, n_zero, n_pairs, progress.part(FACTORED, COARSE_SOLVED))
+            shares = progress.part(COARSE_SOLVED, CERTAIN)
+            found = _corrected(correction, pairs, count, attempt.corrections, shares)
+        except (SingularError, LinAlgError) as error:
+            found, reason = None, error
+        if found is not None:
+            progress(CERTAIN)
+            return correction, found
         progress = progress.part(CERTAIN, 1.0)
-    raise NotConvergedError("corrections stay large")
+    raise NotConvergedError("corrections stay large, or single precision does not suffice") from reason
+
+
+def _smooth_start(
+    operator: ShiftedOperator, n_cells: int, n_zero: int, count: int, progress: Progress
+) -> tuple[FloatArray, FloatArray]:
+    """Approximate pairs in the space of smooth functions."""
+    values, sources, weights = smooth_eigenpairs(operator, n_cells, count, progress.part(0.0, 0.9))
+    vectors = np.empty((len(operator.level.areas), len(values)), dtype=operator.dtype)
+    for columns in panels(*vectors.shape):
+        vectors[:, columns] = operator.factor.solve(sources @ np.ascontiguousarray(weights[:, columns]))
+    return values, vectors
+
+
+def _wide_start(
+    operator: ShiftedOperator, n_cells: int, n_zero: int, count: int, progress: Progress
+) -> tuple[FloatArray, FloatArray]:
+    """Approximate pairs in the space of wide functions."""
+    prolongation, cells = operator.level.coarsened(n_cells, wide=True)
+    progress(0.6)
+    values, weights = coarse_eigenpairs(cells, n_zero, count)
+    return values, block_product(prolongation, weights, FAST_COLUMNS)
+
+
+def _corrected(
+    correction: _Correction, pairs: tuple[FloatArray, FloatArray], count: int, corrections: int, progress: Progress
+) -> tuple[FloatArray, FloatArray] | None:
+    """The lowest `count` pairs after at most so many corrections; None if these stay large or there are fewer pairs.
+
+    After the first correction all functions are made orthogonal, unless they are so or `corrections` is 1.
+    """
+    (values, vectors), level = pairs, correction.level
+    if len(values) < count:
+        return None
+    limit, done, end = LARGEST_CHANGE, 0.0, FIRST_CORRECTION
+    for left in reversed(range(corrections)):
+        changes, overlap = np.empty(len(values)), 0.0
+        for columns in panels(*vectors.shape):
+            panel = np.ascontiguousarray(vectors[:, columns])
+            values[columns], changes[columns] = correction(values[columns], panel)
+            overlap = max(overlap, _overlap(level, panel))
+            vectors[:, columns] = panel
+            progress(done + (end - done) * columns.stop / len(values))
+        converged = changes[:count].max() <= limit
+        if not converged and not left:
+            return None
+        done, limit = end, LARGEST_LATER_CHANGE
+        end += ROUND * (1 - end)
+        if not converged or (left and overlap > LARGEST_OVERLAP):
+            middle = (done + end) / 2
+            values, vectors = _lowest_in_span(level, vectors, progress.part(done, middle))
+            done = middle
+        if converged:
+            break
+    separate_low_values(level, values, vectors)
+    order = np.argsort(values, kind="stable")[:count]
+    return values[order], vectors[:, order].astype(np.float32, copy=False)
 
 
 class _Correction:
@@ -177,11 +234,8 @@ class _Correction:
 
     def __init__(self, level: Level, count: int) -> None:
         self.level = level
-        self.shift = SHIFT_PER_PAIR * count
-        shifted = csr_matrix(level.stiffness + np.float32(self.shift) * level.mass)
-        self.factor = MultifrontalFactor(shifted, level.positions)
-        if self.factor.n_negative:
-            raise NotConvergedError("rounding makes the shifted operator indefinite")
+        self.operator = ShiftedOperator(level, SHIFT_PER_PAIR * count)
+        self.shift = self.operator.shift
 
     def __call__(self, values: FloatArray, vectors: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Correct a panel of vectors in place; returns their Rayleigh quotients and their relative changes."""
@@ -213,47 +267,25 @@ class _Correction:
         single = values.astype(np.float32)
         for rows in _chunks(vectors):
             residual[rows] -= weighted[rows] * single
-        return self.factor.solve(residual), residual, weighted
+        return self.operator.factor.solve(residual), residual, weighted
 
 
-def _enlarged(correction: _Correction, vectors: FloatArray, progress: Progress) -> tuple[FloatArray, FloatArray]:
-    """The same number of eigenpairs, best within the span of the vectors and their large changes.
-
-    This finds functions that are hardly in the coarse space, as those of thin parts of the shape.
-    """
-    level = correction.level
+def _lowest_in_span(level: Level, basis: FloatArray, progress: Progress) -> tuple[FloatArray, FloatArray]:
+    """The non-zero eigenpairs within the span of a basis."""
     zero_modes = level.zero_modes()
-    values, vectors = _lowest_in_span(
-        level, _without(zero_modes, level, vectors), vectors.shape[1], progress.part(0.0, 0.3)
-    )
-    large: list[FloatArray] = []
-    for columns in panels(*vectors.shape):
-        changes = correction.change(values[columns], np.ascontiguousarray(vectors[:, columns]))[0]
-        squares = _dots(changes, _weighted(level, changes))
-        large.append(changes[:, squares > LEAST_USEFUL_CHANGE**2])
-        progress(0.3 + 0.2 * columns.stop / len(values))
-    changes = np.hstack(large)
-    if not changes.shape[1]:
-        return values, vectors
-    changes = _without(vectors, level, _without(zero_modes, level, changes))
-    squares, directions = np.linalg.eigh((changes.T @ _weighted(level, changes)).astype(np.float64))
-    kept = squares > LEAST_DIRECTION * squares[-1]
-    changes = changes @ (directions[:, kept] / np.sqrt(squares[kept])).astype(np.float32)
-    return _lowest_in_span(level, np.hstack([vectors, changes]), vectors.shape[1], progress.part(0.5, 1.0))
-
-
-def _lowest_in_span(level: Level, basis: FloatArray, count: int, progress: Progress) -> tuple[FloatArray, FloatArray]:
-    """The lowest eigenpairs within the span of a basis."""
+    basis = np.asarray(basis - zero_modes @ (_weighted(level, zero_modes).T @ basis))
     energy = basis.T @ _stiff(level, basis)
     progress(0.3)
     squares = basis.T @ _weighted(level, basis)
-    progress(0.8)  # before the dense eigenproblem, which takes half of the time and cannot report
-    return rayleigh_ritz(basis, energy, squares, count)
+    progress(0.8)  # before the dense eigenproblem, which cannot report
+    return rayleigh_ritz(basis, energy, squares)
 
 
-def _without(known: FloatArray, level: Level, vectors: FloatArray) -> FloatArray:
-    """Vectors without their part in the span of known M-orthonormal vectors."""
-    return np.asarray(vectors - known @ (_weighted(level, known).T @ vectors))
+def _overlap(level: Level, vectors: FloatArray) -> float:
+    """Largest product of two M-normalized vectors, which is 0 if they are orthogonal."""
+    products = np.abs(vectors.T @ _weighted(level, vectors))
+    np.fill_diagonal(products, 0)
+    return float(products.max())
 
 
 def _prolonged(
@@ -301,7 +333,7 @@ def _expected_change(
     residual = level.stiffness @ vectors - mass * values[chosen].astype(np.float32)
     change, direction, before = np.zeros_like(vectors), np.zeros_like(vectors), np.ones(len(chosen))
     for _ in range(PROBE_STEPS):
-        conditioned = jacobi * residual + prolongation @ on_cells.factor.solve(prolongation.T @ residual)
+        conditioned = jacobi * residual + prolongation @ on_cells.operator.factor.solve(prolongation.T @ residual)
         now = _dots(residual, conditioned)
         direction = conditioned + direction * (now / before).astype(np.float32)
         image = shifted @ direction

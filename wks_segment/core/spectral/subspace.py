@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import LinAlgError, eigh
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, find, triu
 
 from ..mesh.triangle_mesh import FloatArray
+from .coarsening import Level
+
+LOW_VALUE = 1e-3
+"""Fraction of the last eigenvalue below which single precision does not suffice for an eigenvalue."""
+PAIRS_AT_ONCE = 100_000
+"""Pairs of vertices whose energies are summed at once, so that they need little memory."""
 
 
 def block_product(matrix: csr_matrix, vectors: FloatArray, width: int) -> FloatArray:
@@ -48,6 +54,27 @@ def rayleigh_ritz(
     energy, gram = energy.astype(np.float64), gram.astype(np.float64)
     if not (np.isfinite(energy).all() and np.isfinite(gram).all()):
         raise LinAlgError("the products of the basis are not finite")
-    subset = None if count is None else [0, count - 1]
-    values, rotation = eigh((energy + energy.T) / 2, gram, subset_by_index=subset)
-    return values, basis @ rotation.astype(basis.dtype)
+    # All pairs take less time than some: LAPACK then divides and conquers.
+    values, rotation = eigh((energy + energy.T) / 2, gram)
+    return values[:count], basis @ rotation[:, :count].astype(basis.dtype)
+
+
+def separate_low_values(level: Level, values: FloatArray, vectors: FloatArray) -> None:
+    """Compute values far below the last one, and their vectors, in double precision, in place.
+
+    Parts of a surface that hang together by a thin neck have such values, and the signature takes their logarithm. An
+    energy is a sum over pairs of vertices, because single precision loses the small sum of large products x S x.
+    """
+    low = np.flatnonzero(values < LOW_VALUE * values.max())
+    if not low.size:
+        return
+    zero_modes, masses = level.zero_modes().astype(np.float64), level.mass.astype(np.float64)
+    basis = vectors[:, low].astype(np.float64)
+    basis -= zero_modes @ (zero_modes.T @ (masses @ basis))
+    first, second, couplings = find(triu(level.stiffness, 1))
+    energy = np.zeros((low.size, low.size))
+    for start in range(0, len(couplings), PAIRS_AT_ONCE):
+        pairs = slice(start, start + PAIRS_AT_ONCE)
+        across = basis[first[pairs]] - basis[second[pairs]]
+        energy -= (across * couplings[pairs, None].astype(np.float64)).T @ across
+    values[low], vectors[:, low] = rayleigh_ritz(basis, energy, basis.T @ (masses @ basis))
