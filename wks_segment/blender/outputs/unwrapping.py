@@ -36,8 +36,8 @@ SMART_ANGLE = radians(66)
 """Angle limit of Smart UV Project: Blender's own default."""
 WELD_DISTANCE = 1e-6
 """Vertices that are nearer to each other than this are one, as importers split them at the same place."""
-MOST_SPLITS = 6
-"""Most rounds in which charts that cannot be laid flat are split in two. Of 22 characters 21 need no more."""
+MOST_SPLITS = 10
+"""Most rounds in which charts that cannot be laid flat are split in two. Of 22 characters 21 need at most six."""
 OVERLAP_PIXELS = 1024
 """A chart that lies on itself is split if it does so at a pixel of an image of this width."""
 BACK_OF_BODY = np.array([0.0, 1.0, 0.0])
