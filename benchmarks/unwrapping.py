@@ -24,14 +24,14 @@ from benchmarks.speed import table_row
 from wks_segment.blender.outputs.part_attributes import labels_on
 from wks_segment.blender.outputs.unwrapping import ALONG_SEAMS, unwrap_parts
 from wks_segment.blender.scene.topology import polygon_mesh
+from wks_segment.core.mesh.triangle_mesh import IntArray
 from wks_segment.core.uv.quality import UvQuality, covered_pixels, densities, overlaps
 
 SIZE = 1024
 
 
-def measure(obj: bpy.types.Object) -> list[str]:
-    """Cells of the row of an object."""
-    labels = labels_on(obj.data)
+def measure(obj: bpy.types.Object, labels: IntArray) -> list[str]:
+    """Cells of the row of an object with the (p,) segments of its polygons."""
     start = time.perf_counter()
     uvs = unwrap_parts(bpy.context, obj, labels, ALONG_SEAMS)
     seconds = time.perf_counter() - start
@@ -55,9 +55,10 @@ def main() -> None:
     for path in paths:
         bpy.ops.wm.open_mainfile(filepath=str(path))
         for obj in bpy.data.objects:
-            if obj.type == "MESH" and labels_on(obj.data) is not None:
+            labels = labels_on(obj.data) if obj.type == "MESH" else None
+            if labels is not None:
                 bpy.context.view_layer.objects.active = obj
-                print(table_row([f"{path.stem} {obj.name}", *measure(obj)]), flush=True)
+                print(table_row([f"{path.stem} {obj.name}", *measure(obj, labels)]), flush=True)
 
 
 if __name__ == "__main__":
