@@ -18,6 +18,7 @@ LAYERS = {
     "core": [
         {"files"},
         {"mesh"},
+        {"uv"},
         {"spectral"},
         {"geometry"},
         {"poses"},

@@ -125,7 +125,7 @@ def separated_and_cleared():
 
 def unwrapped():
     """With any UVs: to compute them takes seconds."""
-    unwrap.unwrap_parts = lambda context, mesh, labels, method: np.full((len(mesh.loops), 2), 0.5, dtype=np.float32)
+    unwrap.unwrap_parts = lambda context, obj, labels, method: np.full((len(obj.data.loops), 2), 0.5, dtype=np.float32)
     return OPS.unwrap
 
 

@@ -7,7 +7,7 @@ from bpy.props import EnumProperty
 
 from ...core.message import Message
 from ..outputs.part_attributes import labels_on
-from ..outputs.unwrapping import UNWRAP_METHODS, unwrap_parts
+from ..outputs.unwrapping import UNWRAP_METHODS, unwrap_parts, unwrapped_message
 from ..outputs.uv_maps import check_room_for_uv_map, write_uv_map
 from ..scene.characters import group, selected_meshes
 from . import _needs, _report
@@ -15,7 +15,7 @@ from ._base import BaseOperator
 
 
 class WKS_SEGMENT_OT_unwrap(BaseOperator, bpy.types.Operator):
-    """Unwrap the selected objects segment by segment into a new UV map, with seams along the borders of segments"""
+    """Unwrap the selected objects into a new UV map, cut at borders of segments and along the inner side of limbs"""
 
     bl_idname = "wks_segment.unwrap"
     bl_label = "Unwrap Segments"
@@ -29,13 +29,12 @@ class WKS_SEGMENT_OT_unwrap(BaseOperator, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> set[str]:
         objects = [obj for character in group(selected_meshes(context)) for obj in character.objects]
-        meshes = {obj.data: labels for obj in objects if (labels := labels_on(obj.data)) is not None}
-        for mesh in meshes:
+        labeled = {obj.data: (obj, labels) for obj in objects if (labels := labels_on(obj.data)) is not None}
+        for mesh in labeled:
             check_room_for_uv_map(mesh)
-        for mesh, labels in meshes.items():
-            write_uv_map(mesh, unwrap_parts(context, mesh, labels, self.method))
-        if len(meshes) == 1:
-            _report.tell(self, {"INFO"}, "Unwrapped 1 mesh by segments")
-        else:
-            _report.tell(self, {"INFO"}, Message("Unwrapped {count} meshes by segments", count=len(meshes)))
+        with _report.cursor_progress(context) as progress:
+            for (mesh, (obj, labels)), step in progress.each(list(labeled.items())):
+                step(0.0, Message('UV map of "{name}"', name=obj.name))
+                write_uv_map(mesh, unwrap_parts(context, obj, labels, self.method))
+                _report.tell(self, {"INFO"}, unwrapped_message(obj))
         return {"FINISHED"}

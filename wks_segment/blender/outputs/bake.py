@@ -20,7 +20,7 @@ from .id_map import IMAGE_NAME, NO_PART, with_margin, write_id_map
 from .ledger import Ledger
 from .origin import origin_of
 from .part_attributes import labels_on
-from .unwrapping import project
+from .unwrapping import ALONG_SEAMS, unwrap_parts
 from .uv_maps import write_uv_map
 
 BAKE_ENGINE = "CYCLES"
@@ -98,8 +98,9 @@ def bake_id_maps(
     layers: list[_Layer] = []
     for i, obj in enumerate(objects):
         progress(i / len(objects), Message('ID map of "{name}"', name=obj.name))
-        if not has_uvs(obj.data):
-            write_uv_map(obj.data, project(context, obj.data))
+        labels = labels_on(obj.data)
+        if labels is not None and not has_uvs(obj.data):
+            write_uv_map(obj.data, unwrap_parts(context, obj, labels, ALONG_SEAMS))
         layer = _Layer([obj], origin_of(obj.data).labels, bake_parts(context, obj, options.size, warnings))
         alike = (other for other in layers if other.labels == layer.labels)
         shared = next((other for other in alike if _are_disjoint(layer.covered, other.covered)), None)

@@ -1,4 +1,4 @@
-"""Unwraps a mesh along the borders of its parts, and packs the UV islands part by part."""
+"""Unwraps a mesh along the borders of its parts, and where the parts must be cut open to lie flat."""
 
 from __future__ import annotations
 
@@ -9,9 +9,13 @@ from math import radians
 import bmesh
 import bpy
 import numpy as np
-from mathutils.geometry import box_pack_2d
+from mathutils import Matrix
 
 from ...core.mesh.triangle_mesh import BoolArray, FloatArray, IntArray
+from ...core.message import Message
+from ...core.uv.charts import Charts
+from ...core.uv.cuts import HiddenSide, cut_open, split
+from ...core.uv.quality import UvQuality, faulty_pairs
 from ..parts import part_ids
 from ..scene.attributes import (
     new_attribute,
@@ -22,79 +26,99 @@ from ..scene.attributes import (
     write_bools,
 )
 from ..scene.simulations import check_may_change
-from ..scene.topology import at_corners, border_edges, polygon_sizes
+from ..scene.topology import at_corners, border_edges, polygon_mesh, polygon_sizes
 from .uv_maps import UV_MAP_NAME
 
-ISLAND_MARGIN = 0.004
-"""Space between two UV islands as a share of the image's width: eight pixels of 2048."""
+ISLAND_MARGIN = 5 / 1024
+"""Space between two UV islands as a share of the image's width: four pixels of 1024, and one since Blender's packing is
+not exact."""
 SMART_ANGLE = radians(66)
 """Angle limit of Smart UV Project: Blender's own default."""
 WELD_DISTANCE = 1e-6
 """Vertices that are nearer to each other than this are one, as importers split them at the same place."""
+MOST_SPLITS = 10
+"""Most rounds in which charts that cannot be laid flat are split in two. Of 22 characters 21 need at most six."""
+OVERLAP_PIXELS = 1024
+"""A chart that lies on itself is split if it does so at a pixel of an image of this width."""
+BACK_OF_BODY = np.array([0.0, 1.0, 0.0])
+"""Characters look along -Y in Blender, as its front view shows them."""
 POLYGON_ATTRIBUTE, CORNER_ATTRIBUTE = "wks_segment_polygon", "wks_segment_corner"
 """Attributes of the copy that is unwrapped: index of each polygon and corner in the mesh."""
 ALONG_SEAMS, SMART_PROJECT = "SEAMS", "SMART"
 UNWRAP_METHODS = (
-    (ALONG_SEAMS, "Along Seams", "Cut only at seams. A segment that is closed, or a long tube, needs some"),
+    (ALONG_SEAMS, "Along Seams", "Cut at your seams, and where needed along the inner side of limbs"),
     (SMART_PROJECT, "Smart Project", "Cut where the surface turns, as Smart UV Project does"),
 )
 """Where islands are cut in addition to the borders of segments, as items of an enum property."""
 
 
-def unwrap_parts(context: bpy.types.Context, mesh: bpy.types.Mesh, labels: IntArray, method: str) -> FloatArray:
-    """(corners, 2) UVs of a mesh, cut along the borders of its (p,) parts and by one of `UNWRAP_METHODS`.
-
-    Each part has a box of its own in the image.
-    """
-    with _copy_to_unwrap(context, mesh) as copy:
+def unwrap_parts(context: bpy.types.Context, obj: bpy.types.Object, labels: IntArray, method: str) -> FloatArray:
+    """(corners, 2) UVs of an object's mesh, cut along the borders of its (p,) parts and by one of `UNWRAP_METHODS`."""
+    mesh = obj.data
+    with _copy_to_unwrap(context, mesh, obj.matrix_world) as copy:
         labels = labels[_read_index(copy, POLYGON_ATTRIBUTE)]
-        write_bools(copy.edges, "use_seam", read_bools(copy.edges, "use_seam") | border_edges(copy, labels))
-        _unwrap(copy, labels, method)
-        return _uvs_of_original(mesh, _read_index(copy, CORNER_ATTRIBUTE), _pack_by_part(copy, labels))
-
-
-def project(context: bpy.types.Context, mesh: bpy.types.Mesh) -> FloatArray:
-    """(corners, 2) UVs of a mesh by Smart UV Project."""
-    with _copy_to_unwrap(context, mesh) as copy:
-        _smart_project(copy, np.ones(len(copy.polygons), dtype=bool))
+        if method == SMART_PROJECT:
+            for part in part_ids.unique_parts(labels):
+                _smart_project(copy, labels == part)
+        else:
+            _unwrap(copy, read_bools(copy.edges, "use_seam") | border_edges(copy, labels))
+        _pack(copy)
         return _uvs_of_original(mesh, _read_index(copy, CORNER_ATTRIBUTE), _read_uvs(copy))
 
 
-def _unwrap(copy: bpy.types.Mesh, labels: IntArray, method: str) -> None:
-    """Unwrap the copy, given its (p,) parts, and scale its islands to the same density."""
-    all_polygons = np.ones(len(labels), dtype=bool)
-    if method == SMART_PROJECT:
-        for part in part_ids.unique_parts(labels):
-            _smart_project(copy, labels == part)
-    else:
-        with _editing(copy, all_polygons):
-            bpy.ops.uv.unwrap(method="ANGLE_BASED")
-        # A closed surface cannot be laid flat: unwrap leaves it as a point.
-        _smart_project(copy, _unwrapped_to_points(copy))
-    with _editing(copy, all_polygons):
+def unwrapped_message(obj: bpy.types.Object) -> Message:
+    """What is told of an object that was unwrapped: figures of its active UV map."""
+    uvs = read_floats(obj.data.uv_layers.active.data, "uv", 2).astype(np.float64)
+    quality = UvQuality.of(polygon_mesh(obj.data), uvs)
+    return Message(
+        'Unwrapped "{name}": {even:.1%} of the faces have the same density within 4 ×, and are stretched by '
+        "{stretch:.2f} on average",
+        name=obj.name, even=quality.even, stretch=quality.stretch,
+    )  # fmt: skip
+
+
+def _unwrap(copy: bpy.types.Mesh, closed: BoolArray) -> None:
+    """Unwrap the copy, given the (e,) edges where it is cut in any case.
+
+    A chart that lies on itself or is uneven is split in two, and its halves are unwrapped again. What is left after
+    some rounds, such as teeth of a few faces, is projected.
+    """
+    whole = polygon_mesh(copy)
+    hidden_side = HiddenSide(whole.middle, BACK_OF_BODY)
+    seams, shown = closed.copy(), np.ones(len(whole.sizes), dtype=bool)
+    for _ in range(1 + MOST_SPLITS):
+        mesh = whole.part(shown)
+        seams[mesh.corner_edge] = (closed | cut_open(mesh, closed, hidden_side))[mesh.corner_edge]
+        write_bools(copy.edges, "use_seam", seams)
+        with _editing(copy, shown):
+            bpy.ops.uv.unwrap(method="ANGLE_BASED", fill_holes=True, correct_aspect=False)
+        chart = Charts(mesh, closed).polygon_chart
+        pairs = faulty_pairs(mesh, _read_uvs(copy)[at_corners(copy, shown)], chart, OVERLAP_PIXELS)
+        if not len(pairs):
+            return
+        closed = closed | split(mesh, closed, pairs)
+        shown[shown] = np.isin(chart, chart[pairs[:, 0]])
+    _smart_project(copy, shown)
+
+
+def _smart_project(copy: bpy.types.Mesh, shown: BoolArray) -> None:
+    """Smart UV Project of these (p,) polygons."""
+    with _editing(copy, shown):
+        bpy.ops.uv.smart_project(angle_limit=SMART_ANGLE)
+
+
+def _pack(copy: bpy.types.Mesh) -> None:
+    """Scale the islands to the same density, and pack them."""
+    with _editing(copy):
         bpy.ops.uv.average_islands_scale()
-
-
-def _pack_by_part(copy: bpy.types.Mesh, labels: IntArray) -> FloatArray:
-    """(corners, 2) UVs of the copy, where the islands of each of the (p,) parts lie together in a box."""
-    label_of_corner = at_corners(copy, labels)
-    boxes = []
-    for part in part_ids.unique_parts(labels):
-        with _editing(copy, labels == part):
-            bpy.ops.uv.pack_islands(scale=False, margin_method="ADD", margin=ISLAND_MARGIN)
-        uvs_of_part = _read_uvs(copy)[label_of_corner == part]
-        low, high = uvs_of_part.min(axis=0) - ISLAND_MARGIN, uvs_of_part.max(axis=0) + ISLAND_MARGIN
-        boxes.append([0.0, 0.0, *(high - low).tolist(), part, low])
-    uvs = _read_uvs(copy)
-    size = max(box_pack_2d(boxes))
-    for x, y, _, _, part, low in boxes:
-        uvs[label_of_corner == part] += (x, y) - low
-    return uvs / size
+        bpy.ops.uv.pack_islands(margin_method="FRACTION", margin=ISLAND_MARGIN / 2, shape_method="AABB")
+        # Packed by their shapes, which is slow with an exact margin, islands grow a little, and the margin with them.
+        bpy.ops.uv.pack_islands(margin_method="ADD", margin=ISLAND_MARGIN / 2)
 
 
 @contextmanager
-def _copy_to_unwrap(context: bpy.types.Context, mesh: bpy.types.Mesh) -> Iterator[bpy.types.Mesh]:
-    """A temporary copy of a mesh with one UV map, on the active and only selected object.
+def _copy_to_unwrap(context: bpy.types.Context, mesh: bpy.types.Mesh, matrix: Matrix) -> Iterator[bpy.types.Mesh]:
+    """A temporary copy of a mesh in world space with one UV map, on the active and only selected object.
 
     Blender's UV operators work on what is in Edit Mode. Vertices at the same place are merged in the copy, since
     importers split them where shading is flat; attributes keep the index of each polygon and corner in the mesh.
@@ -111,7 +135,10 @@ def _copy_to_unwrap(context: bpy.types.Context, mesh: bpy.types.Mesh) -> Iterato
         copy.uv_layers.new(name=UV_MAP_NAME, do_init=False)
         new_attribute(copy, POLYGON_ATTRIBUTE, "INT", "FACE", np.arange(len(copy.polygons)))
         new_attribute(copy, CORNER_ATTRIBUTE, "INT", "CORNER", np.arange(len(copy.loops)))
+        copy.materials.clear()  # islands are stretched to the width and height of a material's image
         _weld(copy)
+        if matrix.determinant():
+            copy.transform(matrix)
         context.scene.collection.objects.link(owner)
         for obj in selected:
             obj.select_set(False)
@@ -126,21 +153,6 @@ def _copy_to_unwrap(context: bpy.types.Context, mesh: bpy.types.Mesh) -> Iterato
         layer.objects.active = active
         for obj in selected:
             obj.select_set(True)
-
-
-def _smart_project(mesh: bpy.types.Mesh, shown: BoolArray) -> None:
-    """Smart UV Project of these (p,) polygons."""
-    if shown.any():
-        with _editing(mesh, shown):
-            bpy.ops.uv.smart_project(angle_limit=SMART_ANGLE, island_margin=ISLAND_MARGIN)
-
-
-def _unwrapped_to_points(mesh: bpy.types.Mesh) -> BoolArray:
-    """(p,) whether all corners of a polygon are at one point of the UV map."""
-    uvs, sizes = _read_uvs(mesh), polygon_sizes(mesh)
-    starts = np.cumsum(sizes) - sizes
-    extent = np.maximum.reduceat(uvs, starts) - np.minimum.reduceat(uvs, starts)
-    return np.asarray(extent.max(axis=1) == 0)
 
 
 def _weld(mesh: bpy.types.Mesh) -> None:
@@ -176,8 +188,10 @@ def _uvs_of_original(mesh: bpy.types.Mesh, corner_of: IntArray, uvs: FloatArray)
 
 
 @contextmanager
-def _editing(mesh: bpy.types.Mesh, shown: BoolArray) -> Iterator[None]:
-    """Edit Mode of the active object, with these (p,) polygons of its mesh selected and the others hidden."""
+def _editing(mesh: bpy.types.Mesh, shown: BoolArray | None = None) -> Iterator[None]:
+    """Edit Mode of the active object, with these (p,) polygons of its mesh, or all, selected and the others hidden."""
+    if shown is None:
+        shown = np.ones(len(mesh.polygons), dtype=bool)
     write_bools(mesh.polygons, "hide", ~shown)
     used = np.zeros(len(mesh.vertices), dtype=bool)
     used[read_ints(mesh.loops, "vertex_index")[at_corners(mesh, shown)]] = True

@@ -309,7 +309,7 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
     )  # fmt: skip
     bake_unwrap: BoolProperty(
         name="Unwrap if Needed",
-        description="Give an object without a UV map one by Smart UV Project. Clear removes it",
+        description="Give an object without a UV map one as Unwrap Segments does. Clear removes it",
         default=False,
     )
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.mesh.triangle_mesh import BoolArray, IntArray
+from ...core.uv.charts import PolygonMesh
 from .attributes import read_floats, read_ints
 
 MOST_AROUND_EDGE = 8
@@ -31,6 +32,16 @@ def at_corners(mesh: bpy.types.Mesh, values: NDArray[T]) -> NDArray[T]:
 def corners_of(mesh: bpy.types.Mesh) -> tuple[IntArray, IntArray]:
     """Vertex and polygon of each corner of a mesh."""
     return read_ints(mesh.loops, "vertex_index"), at_corners(mesh, np.arange(len(mesh.polygons)))
+
+
+def polygon_mesh(mesh: bpy.types.Mesh) -> PolygonMesh:
+    """The polygons of a mesh as arrays."""
+    mesh.calc_loop_triangles()
+    return PolygonMesh(
+        read_floats(mesh.vertices, "co", 3).astype(np.float64), len(mesh.edges),
+        read_ints(mesh.loops, "vertex_index"), read_ints(mesh.loops, "edge_index"), polygon_sizes(mesh),
+        read_ints(mesh.loop_triangles, "loops", 3),
+    )  # fmt: skip
 
 
 def border_edges(mesh: bpy.types.Mesh, labels: IntArray) -> BoolArray:

@@ -47,6 +47,8 @@ class Report:
         How certain the model is of each number of segments, in lines.
     left_out
         Frames that were left out, with the reason.
+    unwrapped
+        Objects that were unwrapped, with figures of their UV maps.
     warnings
         Problems that did not stop the run.
     """
@@ -60,6 +62,7 @@ class Report:
     choices: list[str] = field(default_factory=list)
     curve: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
+    unwrapped: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
     def add_model(self, model: PoseSegmentation) -> None:
@@ -80,7 +83,7 @@ class Report:
     @property
     def notes(self) -> list[str]:
         """Facts to show."""
-        return [*self.choices, *self.curve]
+        return [*self.choices, *self.curve, *self.unwrapped]
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:

@@ -13,10 +13,11 @@ import numpy as np
 
 from ....core.progress import Progress
 from ...errors import UserError
-from ...outputs.bake import BakeOptions, bake_id_maps
+from ...outputs.bake import BakeOptions, bake_id_maps, has_uvs
 from ...outputs.id_map import save_image
 from ...outputs.origin import Origin
 from ...outputs.part_attributes import labels_on
+from ...outputs.unwrapping import unwrapped_message
 from ...props.settings import WKSSegmentSettings
 from ...scene import file_formats
 from ...scene.characters import Character
@@ -42,9 +43,7 @@ def add(commands: Any) -> None:
     )  # fmt: skip
     bake.add_argument("--model", type=named_path, help="find the parts with this model, even if the file has parts")
     add_object(bake)
-    bake.add_argument(
-        "--unwrap", action="store_true", help="unwrap objects without a UV map by Smart UV Project; see --blend"
-    )
+    bake.add_argument("--unwrap", action="store_true", help="unwrap objects without a UV map by segments; see --blend")
     bake.add_argument("--blend", type=named_path, help="also write the scene to this file, with UV maps and images")
     add_labeling_settings(bake)
     add_settings(bake, BAKE_OPTIONS)
@@ -101,6 +100,8 @@ def _bake_images(
     """Bake an ID map for each image of the characters; name and file of each."""
     files: dict[str, Path] = {}
     bake_options = BakeOptions(settings.bake_size, settings.bake_margin, options.unwrap)
+    objects = [obj for character in characters for obj in character.objects if len(obj.data.polygons)]
+    without_uvs = [obj for obj in objects if not has_uvs(obj.data)]
     with run.report.stage("bake"):
         id_maps = [
             id_map
@@ -111,4 +112,5 @@ def _bake_images(
             suffix = "" if len(id_maps) == 1 else f"_{bpy.path.clean_name(id_map.objects[0].name)}"
             files[id_map.image.name] = options.output.with_stem(options.output.stem + suffix)
             save_image(id_map.image, files[id_map.image.name])
+    run.report.unwrapped += [unwrapped_message(obj) for obj in without_uvs]
     return files
