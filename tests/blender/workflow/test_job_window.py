@@ -80,6 +80,19 @@ def test_large_job_runs_after_the_question(poses, settings, window):
     assert ran.execute(bpy.context) == {"FINISHED"}
 
 
+def test_clear_is_gray_while_a_job_runs(poses, hold_at):
+    select(*poses)
+    assert OPS.learn() == {"FINISHED"}
+    assert OPS.clear.poll()
+    ran, go_on = hold_at("Labels")
+    assert not OPS.clear.poll()
+    with pytest.raises(RuntimeError, match="A job is running"):
+        OPS.clear()
+    go_on()
+    finish_job(ran)
+    assert OPS.clear() == {"FINISHED"}
+
+
 def test_refusal_is_reported_in_the_window(settings, window):
     settings.source = "SHAPE_KEYS"
     select(limbed())

@@ -182,7 +182,7 @@ GERMAN_INTERFACE = {
     "Update the segments of the selected objects to the current settings, each by its own model": "Die Segmente der ausgewählten Objekte an die jetzigen Einstellungen anpassen, jedes mit seinem eigenen Modell",
     "Write the previewed segments": "Die Segmente der Vorschau schreiben",
     "Hide the previewed segments, and restore the settings of the written ones": "Die Segmente der Vorschau verbergen und die Einstellungen der geschriebenen wiederherstellen",
-    "Remove everything that was written to the selected objects; asks first if faces were assigned by hand": "Alles entfernen, was an die ausgewählten Objekte geschrieben wurde; fragt vorher, wenn Flächen von Hand zugewiesen wurden",
+    "Remove everything that was written to the selected objects, and nothing else. Asks first if that takes faces assigned by hand or separated objects": "Alles von den ausgewählten Objekten entfernen, was geschrieben wurde, und sonst nichts. Fragt vorher, wenn das von Hand zugewiesene Flächen oder getrennte Objekte kostet",
     "Bake the segments of the selected objects to an image of flat colors, with Cycles on the CPU": "Die Segmente der ausgewählten Objekte in ein Bild aus reinen Farben backen, mit Cycles auf der CPU",
     "Unwrap the selected objects segment by segment into a new UV map, with seams along the borders of segments": "Die ausgewählten Objekte Segment für Segment in eine neue UV-Map abwickeln, mit Nähten entlang der Grenzen der Segmente",
     "Where islands are cut in addition to the borders of segments": "Wo Inseln außer an den Grenzen der Segmente geschnitten werden",

@@ -93,6 +93,8 @@ GERMAN_MESSAGES = {
     "What Live needs was not kept: press Update Segments once, and it follows again": "Was Live braucht, wurde nicht aufbewahrt: einmal „Segmente aktualisieren“ drücken, dann folgt es wieder",
     "the colors of the palette are not numbers by segment": "die Farben der Palette sind keine Zahlen je Segment",
     "{count} faces that were assigned by hand are cleared as well": "{count} von Hand zugewiesene Flächen werden mit geleert",
+    'All {count} objects that were separated from "{object}" are removed, and it is shown again': 'Alle {count} Objekte, die von "{object}" getrennt wurden, werden entfernt, und es ist wieder zu sehen',
+    '{count} objects that were separated from "{object}" are removed, and it is shown again; those that you have changed stay: {names}': '{count} Objekte, die von "{object}" getrennt wurden, werden entfernt, und es ist wieder zu sehen; geänderte bleiben: {names}',
     "{names}: the transferred segments stay, Clear removes them": "{names}: die übertragenen Segmente bleiben, Leeren entfernt sie",
     '"{model}" does not fit "{character}", and no other model does: learn a new one': "„{model}“ passt nicht zu „{character}“, und kein anderes Modell passt: ein neues lernen",
     '"{model}" does not fit "{character}": "{better}" fits better': "„{model}“ passt nicht zu „{character}“: „{better}“ passt besser",
