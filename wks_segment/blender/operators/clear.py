@@ -76,8 +76,9 @@ def _losses(selected: list[bpy.types.Object]) -> list[Message]:
     count = sum(faces_by_hand(mesh) for mesh in {obj.data for obj in selected})
     if count:
         losses.append(Message("{count} faces that were assigned by hand are cleared as well", count=count))
-    for original in dict.fromkeys(original_of(obj) for obj in selected):
-        separated = [] if original is None else separated_from(original)
+    originals = [original for obj in selected if (original := original_of(obj)) is not None]
+    for original in dict.fromkeys(originals):
+        separated = separated_from(original)
         removed = [obj for obj in separated if is_as_made(obj)]
         kept = [obj.name for obj in separated if obj not in removed]
         if separated:

@@ -16,6 +16,7 @@ from bpy.app.handlers import persistent
 from ...core.message import Message, message_of
 from ...core.progress import Progress
 from ..errors import ChangedError, EndedError, UserError
+from .passing_message import PassingMessage
 
 TIMER_INTERVAL = 0.1
 """Seconds between two looks at a job. With more the bar moves in jumps; with less Blender redraws for nothing."""
@@ -163,8 +164,7 @@ class JobHolder:
 
     def __init__(self) -> None:
         self.job: BackgroundJob | None = None
-        self.message = ""
-        """Why the last job ended early; empty if it did not."""
+        self._ended = PassingMessage()
         self._timer: Any = None
         self._handlers = (
             (bpy.app.handlers.load_pre, self._on_load),
@@ -174,11 +174,17 @@ class JobHolder:
         for handlers, function in self._handlers:
             handlers.append(function)
 
+    @property
+    def message(self) -> str:
+        """Why the last job ended early; empty if it did not, or if that is long ago."""
+        return self._ended.text
+
     def start(self, name: str, compute: Callable[[Progress], None], check: Callable[[], None]) -> BackgroundJob:
         """Start a `BackgroundJob`; UserError if one is running."""
         if self.job is not None:
             raise UserError(JOB_RUNNING)
-        self.job, self.message = BackgroundJob(name, compute, check), ""
+        self.job = BackgroundJob(name, compute, check)
+        self._ended.show("")
         return self.job
 
     def start_timer(self, context: bpy.types.Context) -> None:
@@ -186,8 +192,8 @@ class JobHolder:
         self._timer = context.window_manager.event_timer_add(TIMER_INTERVAL, window=context.window)
 
     def release(self, message: str = "") -> None:
-        """Release the job; one that still runs is asked to end. The panel shows the message until the next job."""
-        self.message = message
+        """Release the job; one that still runs is asked to end. The panel shows the message for a while."""
+        self._ended.show(message)
         if self.job is not None:
             self.job.end()
             self.job = None
@@ -220,13 +226,3 @@ def job_holder(context: bpy.types.Context) -> JobHolder:
     """The job holder of this Blender."""
     holder: JobHolder = getattr(context.window_manager, JOB_HOLDER)
     return holder
-
-
-def redraw_sidebars(context: bpy.types.Context) -> None:
-    """Redraw the sidebars of all 3D viewports, where the panel is."""
-    for window in context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                for region in area.regions:
-                    if region.type == "UI":
-                        region.tag_redraw()
