@@ -71,7 +71,7 @@ class Prepared:
 
     def describing_share(self, rest: float) -> float:
         """Share of the time of a job that is spent on signatures; see `core.poses.describe`."""
-        return describing_share(list(self.known.values()).count(None), len(self.originals), rest)
+        return describing_share(list(self.known.values()).count(None), len(self.known), rest)
 
 
 def prepare(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> Prepared:

@@ -46,7 +46,7 @@ MAX_CORRECTIONS = 4
 LEAST_VALUE = 1e-6
 """Fraction of the last eigenvalue below which the first one is rounding, or needs more digits than there are."""
 
-FACTORED, PREPARED, COARSE_SOLVED, CORRECTED, CERTAIN = 0.1, 0.35, 0.5, 0.53, 0.9
+FACTORED, PREPARED, COARSE_SOLVED, CORRECTED, CERTAIN = 0.05, 0.14, 0.5, 0.53, 0.9
 """Shares of the time of a solve after which the operator is factorized, the coarse space is made and solved, its
 functions are corrected, and the pairs are certain. In between, rounds enlarge the space and correct again. The dense
 coarse problem cannot report: it takes from 0.1 to 0.4 of the time if there are rounds, and from 0.2 to 0.9 if there are
