@@ -38,7 +38,8 @@ LABEL_SETTINGS: dict[str, dict[str, Any]] = {
     },
     "sides": {
         "name": "Sides",
-        "description": "Whether left and right parts of a segment are told apart; left is where X points at rest",
+        "description": "Whether left and right parts of a segment are told apart; left is as bones are named, or where "
+        "X points at rest",
         "items": [
             ("one", "One Part for Both", "Both sides have the same number, name and color"),
             (

@@ -19,10 +19,10 @@ NO_SEGMENTS = "No segments yet: learn a model, or apply one"
 def status(context: bpy.types.Context) -> str:
     """What is to be said while no job runs: what just happened, what Live needs, or whose segments are shown."""
     session, settings = session_of(context), context.scene.wks_segment
-    if session.proposed is not None:
-        return "Preview: nothing is written before you press Accept"
     if session.message or job_holder(context).message:
         return session.message or job_holder(context).message
+    if session.proposed is not None:
+        return "Preview: nothing is written before you press Accept"
     if settings.live and session.can_update(context.scene):
         if session.is_slow:
             return Message("Labels take {seconds:.0f} seconds here, too long to update live", seconds=session.seconds)

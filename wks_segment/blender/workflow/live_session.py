@@ -12,7 +12,7 @@ from bpy.app.handlers import persistent
 
 from ...core import MemoryCache
 from ...core.mesh.triangle_mesh import IntArray
-from ...core.message import message_of
+from ...core.message import Message, message_of
 from ...core.progress import Progress
 from ..errors import ChangedError, UserError
 from ..outputs.origin import Origin, origin_of
@@ -180,7 +180,11 @@ class Session:
         if rest > 0 or job_holder(context).job is not None:
             return max(rest, QUIET_SECONDS)
         scene = context.scene
-        if not self.holds(scene) or self.is_current(scene) or context.mode != "OBJECT":
+        if not self.holds(scene) or context.mode != "OBJECT":
+            return None
+        if self.is_current(scene):  # again, after a preview or a warning
+            self.withdraw()
+            self.tell("")
             return None
         window = next(iter(context.window_manager.windows), None)
         try:
@@ -232,6 +236,12 @@ class Session:
         for job in update.jobs:
             with self._dropping(job.name):
                 self.write(job)
+        self._tell_warnings(update)
+
+    def _tell_warnings(self, update: UpdateJob) -> None:
+        """Show warnings in the panel: what a timer does is not in the status bar."""
+        warnings = dict.fromkeys(warning for job in update.jobs for warning in job.report.warnings)
+        self.tell(Message.joined(". ", warnings))
 
     def propose(self, context: bpy.types.Context) -> None:
         """Show in the viewport what an update would write."""
@@ -239,7 +249,7 @@ class Session:
         if self.proposed is None or update is not self.proposed[1]:
             update.compute(Progress())
         self.proposed = values_of(context.scene.wks_segment), update
-        self.tell("")
+        self._tell_warnings(update)
         shown: dict[Character, IntArray] = {}
         styles: dict[Character, Style] = {}
         for job in update.jobs:

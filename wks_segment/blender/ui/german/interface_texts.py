@@ -72,7 +72,7 @@ GERMAN_INTERFACE = {
     "Automatic": "Automatisch",
     "As many segments as there are distinct parts by shape and motion, up to 16": "So viele Segmente, wie sich Teile nach Form und Bewegung unterscheiden, höchstens 16",
     "Sides": "Seiten",
-    "Whether left and right parts of a segment are told apart; left is where X points at rest": "Ob linke und rechte Teile eines Segments unterschieden werden; links ist, wohin X in Ruhe zeigt",
+    "Whether left and right parts of a segment are told apart; left is as bones are named, or where X points at rest": "Ob linke und rechte Teile eines Segments unterschieden werden; links ist, wie Knochen benannt sind, sonst wohin X in Ruhe zeigt",
     "One Part for Both": "Ein Teil für beide",
     "Both sides have the same number, name and color": "Beide Seiten haben dieselbe Nummer, denselben Namen und dieselbe Farbe",
     "Left and Right": "Links und rechts",
