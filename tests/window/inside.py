@@ -175,6 +175,13 @@ def make_active(name):
     yield from settle()
 
 
+def select_also(*names):
+    """Select objects that cannot be clicked, since they lie inside one another."""
+    for name in names:
+        bpy.data.objects[name].select_set(True, view_layer=_window().view_layer)
+    yield from settle()
+
+
 def edit_material(name, metallic, new_name):
     """Set a value of a material's shader and rename the material, as an artist does in the Properties editor."""
     material = bpy.data.materials[name]

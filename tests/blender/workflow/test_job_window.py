@@ -122,7 +122,7 @@ def test_panel_shows_progress_and_why_a_job_ended(poses, hold_at, monkeypatch):
     job = job_holder(bpy.context).job
     job.stage, job.share = 'Signature of "Fox, frame 12" (3 of 5)', 0.375
     text, row = drawn()
-    assert text == "Signature of Fox, frame 12 · 3\N{NO-BREAK SPACE}of\N{NO-BREAK SPACE}5"
+    assert text == "Signature of Fox, frame 12 ·\N{NO-BREAK SPACE}3\N{NO-BREAK SPACE}of\N{NO-BREAK SPACE}5"
     row.progress.assert_called_once_with(factor=0.375, text="38 %")
     assert row.operator.call_args.args == ("wks_segment.cancel",)
     OPS.cancel()

@@ -110,7 +110,9 @@ class WKS_SEGMENT_PT_segments(SubPanel, bpy.types.Panel):
         column = row.column(align=True)
         column.operator("wks_segment.select_segment", text="", icon="RESTRICT_SELECT_OFF")
         column.operator("wks_segment.isolate_segment", text="", icon="ZOOM_SELECTED")
-        column.menu("WKS_SEGMENT_MT_names", text="", icon="SORTALPHA")
+        names = column.column(align=True)
+        names.enabled = len(settings.segments) > 0
+        names.menu("WKS_SEGMENT_MT_names", text="", icon="SORTALPHA")
         column.separator()
         column.menu("WKS_SEGMENT_MT_specials", text="", icon="DOWNARROW_HLT")
         row = layout.row(align=True)
@@ -119,7 +121,9 @@ class WKS_SEGMENT_PT_segments(SubPanel, bpy.types.Panel):
             row.operator("wks_segment.new_segment", text=in_panel("New"))
             row.operator("wks_segment.forget_faces", text=in_panel("Forget"))
         else:
-            row.menu("WKS_SEGMENT_MT_merge", text=in_panel("Merge Into"))
+            others = row.row(align=True)
+            others.enabled = len(settings.segments) > 1
+            others.menu("WKS_SEGMENT_MT_merge", text=in_panel("Merge Into"))
             row.operator("wks_segment.split_segment", text=in_panel("Split"))
         text = Message("{count} faces by hand", count=settings.faces_by_hand) if settings.faces_by_hand else ""
         layout.label(text=in_panel(text), icon="HAND" if text else "NONE")
