@@ -25,7 +25,7 @@ def status(context: bpy.types.Context) -> str:
         return "Preview: nothing is written before you press Accept"
     if settings.live and session.can_update(context.scene):
         if session.is_slow:
-            return Message("Labels take {seconds:.0f} seconds here, too long to update live", seconds=session.seconds)
+            return Message("Segments take {seconds:.0f} seconds here, too long for Live", seconds=session.seconds)
         if not session.holds(context.scene):
             return ASLEEP
     return whose_segments(context)

@@ -87,7 +87,7 @@ GERMAN_MESSAGES = {
     "parts": "Teile",
     "regions": "Bereiche",
     # Live, and the models that fit.
-    "Labels take {seconds:.0f} seconds here, too long to update live": "Labels brauchen hier {seconds:.0f} Sekunden, zu lange für Live",
+    "Segments take {seconds:.0f} seconds here, too long for Live": "Segmente brauchen hier {seconds:.0f} Sekunden, zu lange für Live",
     "Nothing is selected that has segments of a model: use Learn and Segment or Apply to Selected": "Nichts ist ausgewählt, das Segmente eines Modells hat: „Lernen und segmentieren“ oder „Auf Auswahl anwenden“ drücken",
     "What Live needs was not kept: press Update Segments once, and it follows again": "Was Live braucht, wurde nicht aufbewahrt: einmal „Segmente aktualisieren“ drücken, dann folgt es wieder",
     "the colors of the palette are not numbers by segment": "die Farben der Palette sind keine Zahlen je Segment",
