@@ -186,7 +186,7 @@ def wrapped(text: str) -> list[str]:
 
 def wrapped_lines(shown: str) -> list[str]:
     """A translated text in lines that fit into the sidebar; a pair of numbers such as "3 of 5" stays in one line."""
-    pair = r"(?<=\d) (?=\d|(of|von) \d)|((?<=\d of)|(?<=\d von)) (?=\d)"
+    pair = r"(?<=·) (?=\d+ (of|von) \d)|(?<=\d) (?=\d|(of|von) \d)|((?<=\d of)|(?<=\d von)) (?=\d)"
     joined = re.sub(pair, "\N{NO-BREAK SPACE}", shown)
     return [short for line in joined.splitlines() for short in wrap(line, SIDEBAR_LETTERS)]
 

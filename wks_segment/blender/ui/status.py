@@ -53,5 +53,5 @@ def job_texts(job: BackgroundJob) -> tuple[str, str]:
     """
     if job.ending:
         return in_panel("Canceling"), in_panel(job.reason)
-    stage = re.sub(r" \((\d+ \w+ \d+)\)$", " ·\N{NO-BREAK SPACE}\\1", in_panel(job.stage).replace('"', ""))
+    stage = re.sub(r" \((\d+ \w+ \d+)\)$", r" · \1", in_panel(job.stage).replace('"', ""))
     return stage, in_panel(job.time_left) or f"{100 * job.share:.0f} %"
