@@ -6,9 +6,16 @@ LARGE, SMALL = "Creature", "Calf"
 MARKED = "Arm"
 
 
+def click(window, name):
+    """Click on a character, unless it is selected: another click would select what is behind it."""
+    if window.ask("state")["selected"] != [name]:
+        window.select(name)
+        window.settle()
+
+
 def learn(window, name):
     """Click on a character and press Learn and Segment."""
-    window.select(name)
+    click(window, name)
     window.press("wks_segment.learn")
     window.wait_for("segments", name)
     window.wait_for("job_is_over")
@@ -56,30 +63,29 @@ def rename(window, index, name):
 
 
 def test_edits_reach_the_selected_character_only(both, shot):
-    untouched, before = both.ask("contents", SMALL), both.ask("contents", LARGE)
+    untouched = both.ask("contents", SMALL)
     both.merge(1, into=0)
     assert len(both.ask("segments", LARGE)) == 7
     shot("merged")
-    both.click(*both.swatch(2))  # the color picker, which closes when the mouse leaves it
-    both.over_viewport()
-    both.move(*both.swatch(2))
+    merged = both.ask("contents", LARGE)
+    first, second = both.swatch(2), both.swatch(3)
+    both.move(*first)
     both.key("ctrl+c")
-    both.move(*both.swatch(3))
+    both.move(*second)
     both.key("ctrl+v")
     recolored = both.ask("contents", LARGE)
-    assert recolored["attribute wks_segment_color"] != before["attribute wks_segment_color"]
+    assert recolored["attribute wks_segment_color"] != merged["attribute wks_segment_color"]
+    assert recolored["attribute wks_segment"] == merged["attribute wks_segment"]
     rename(both, 0, MARKED)
     assert names(both)[0] == MARKED
     assert both.ask("contents", SMALL) == untouched
     shot("named")
-    both.select(SMALL)
-    both.settle()
+    click(both, SMALL)
     assert names(both) == [f"Segment {i}" for i in range(1, 9)], "the list follows the active object"
     shot("the other one")
     learn(both, SMALL)
     assert MARKED not in names(both)
-    both.select(LARGE)
-    both.settle()
+    click(both, LARGE)
     named = both.ask("segments", LARGE)["0"]
     assert names(both)[0] == MARKED
     learn(both, LARGE)
@@ -94,22 +100,19 @@ def test_edits_reach_the_selected_character_only(both, shot):
 def test_fields_follow_the_clicked_character_and_live_cuts_that_one(both, shot):
     enter(both, "n_segments", "6", LARGE, 6)
     large = both.ask("contents", LARGE)
-    both.select(SMALL)
-    both.settle()
+    click(both, SMALL)
     assert both.ask("state")["settings"]["n_segments"] == 8
     shot("fields of the small one")
     enter(both, "n_segments", "4", SMALL, 4)
     assert both.ask("contents", LARGE) == large
     shot("the small one is cut")
-    both.select(LARGE)
-    both.settle()
+    click(both, LARGE)
     assert both.ask("state")["settings"]["n_segments"] == 6
     assert len(names(both)) == 6
 
 
 def test_going_back_to_a_number_gives_back_merges_and_faces_by_hand(small, shot):
     small.merge(1, into=0)
-    small.select(SMALL)
     small.click(*small.row(2))
     small.press("wks_segment.select_segment")
     small.click(*small.row(0))
@@ -180,7 +183,7 @@ def test_live_works_again_after_the_file_was_opened(small, shot):
     small.key("ctrl+s")
     small.stop()
     small.start("/window/pair.blend")
-    small.select(SMALL)
+    click(small, SMALL)
     small.open_sidebar()
     shot("opened")
     small.enter("n_segments", "6")

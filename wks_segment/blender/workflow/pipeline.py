@@ -104,7 +104,7 @@ def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[Work
     n_faces = max(int(pose.polygon_of.max()) + 1 for pose in poses)
     if model.n_segments != "auto" and model.n_segments > n_faces:
         raise UserError(
-            '"{character}" has {faces} faces, too few for {segments} segments: take fewer segments, or subdivide it',
+            '"{character}" has too few faces ({faces}) for {segments} segments: take fewer segments, or subdivide it',
             character=poses[0].character.name,
             faces=n_faces,
             segments=model.n_segments,

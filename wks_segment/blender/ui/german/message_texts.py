@@ -219,7 +219,7 @@ GERMAN_MESSAGES = {
     "the mesh has no area: all its faces are points or lines; check the scale of the mesh": "das Mesh hat keinen Flächeninhalt: alle seine Flächen sind Punkte oder Linien; die Skalierung des Meshs prüfen",
     "every face of the mesh collapses when vertices at the same position are joined": "jede Fläche des Meshs fällt zusammen, wenn Vertices an derselben Stelle vereint werden",
     "the mesh has only {count} vertices, so only {count} eigenpairs exist": "das Mesh hat nur {count} Vertices, also gibt es nur {count} Eigenpaare",
-    '"{character}" has {faces} faces, too few for {segments} segments: take fewer segments, or subdivide it': '"{character}" hat {faces} Flächen, zu wenige für {segments} Segmente: weniger Segmente nehmen oder es unterteilen',
+    '"{character}" has too few faces ({faces}) for {segments} segments: take fewer segments, or subdivide it': '"{character}" hat zu wenige Flächen ({faces}) für {segments} Segmente: weniger Segmente nehmen oder es unterteilen',
     "a link uses a vertex that does not exist; the mesh has {n_vertices} vertices": "eine Verbindung nennt einen Vertex, den es nicht gibt; das Mesh hat {n_vertices} Vertices",
     "face {face} uses a vertex that does not exist: {corners}, the mesh has {n_vertices} vertices ({count} such faces in all)": "Fläche {face} nennt einen Vertex, den es nicht gibt: {corners}, das Mesh hat {n_vertices} Vertices ({count} solche Flächen insgesamt)",
     "face {face} uses a vertex twice: {corners} ({count} such faces in all)": "Fläche {face} hat einen Vertex zweimal: {corners} ({count} solche Flächen insgesamt)",
