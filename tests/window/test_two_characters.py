@@ -202,19 +202,23 @@ def test_nothing_in_the_panel_moves(pair, shot):
     color = pair.ask("state")["colors"]
     pair.press("wks_segment.learn")
     pair.wait_for("job_runs", timeout=20)
-    assert places(pair) == before
+    assert places(pair) == pytest.approx(before, abs=STEP)
     shot("while a job runs")
     pair.wait_for("segments", SMALL)
     pair.wait_for("job_is_over")
     pair.settle()
-    assert places(pair) == before
+    assert places(pair) == pytest.approx(before, abs=STEP)
     shot("learned")
     undo(pair)
     assert pair.ask("state")["colors"] == color, "the shading is as before"
-    assert places(pair) == before
+    assert places(pair) == pytest.approx(before, abs=STEP)
     shot("undone")
 
 
+STEP = 9
+"""Pixels that the probe for a button may be off, by its own step; a row is more than twice as high."""
+
+
 def places(window):
-    """Heights of buttons in the panel, as far as the probe tells: half a row."""
-    return [window.find(f"wks_segment.{name}")[1] // 20 for name in ("learn", "select_segment")]
+    """Heights of buttons in the panel."""
+    return [window.find(f"wks_segment.{name}")[1] for name in ("learn", "clear", "select_segment")]
