@@ -84,7 +84,7 @@ def test_clear_is_gray_while_a_job_runs(poses, hold_at):
     select(*poses)
     assert OPS.learn() == {"FINISHED"}
     assert OPS.clear.poll()
-    ran, go_on = hold_at("Labels")
+    ran, go_on = hold_at("Segments")
     assert not OPS.clear.poll()
     with pytest.raises(RuntimeError, match="A job is running"):
         OPS.clear()

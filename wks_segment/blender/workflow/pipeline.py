@@ -167,7 +167,7 @@ def _parts_of(model: PoseSegmentation, views: MeshViews, request: LabelRequest, 
     """(p,) part of each polygon of a mesh."""
     two_sides = request.sides == "two"
     min_share = None if model.preset == "paper" else request.min_share
-    stage = Message('Labels of "{character}"', character=views.name)
+    stage = Message('Segments of "{character}"', character=views.name)
     step = progress.part(0.0, SEGMENT_SHARE if two_sides else 1.0, stage)
     step(0.0)
     parts = model.segment_polygons(

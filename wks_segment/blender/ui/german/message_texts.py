@@ -59,7 +59,7 @@ GERMAN_MESSAGES = {
     "frame {frame}": "Frame {frame}",
     "{name}, rest position": "{name}, Ruhepose",
     "Learning the segments": "Segmente werden gelernt",
-    'Labels of "{character}"': 'Segmente von "{character}"',
+    'Segments of "{character}"': 'Segmente von "{character}"',
     'Left and right of "{character}"': 'Links und rechts von "{character}"',
     'Weights of "{character}"': 'Gewichte von "{character}"',
     'ID map of "{name}"': 'ID-Map von "{name}"',
