@@ -214,6 +214,11 @@ def n_segments(name, count):
     return len(segments(name)) == count
 
 
+def other_segments(name, known):
+    """Whether the segments of an object are others than known ones."""
+    return segments(name) != known
+
+
 def groups(name, beginning):
     """Names of the vertex groups of an object with a common beginning."""
     return [group.name for group in bpy.data.objects[name].vertex_groups if group.name.startswith(beginning)]
