@@ -278,6 +278,7 @@ def _values(mesh, name):
 def _hash_values(attribute):
     prop, width = {
         "FLOAT_VECTOR": ("vector", 3), "FLOAT2": ("vector", 2), "BYTE_COLOR": ("color", 4), "FLOAT_COLOR": ("color", 4),
+        "INT16_2D": ("value", 2), "INT32_2D": ("value", 2), "QUATERNION": ("value", 4), "FLOAT4X4": ("value", 16),
     }.get(attribute.data_type, ("value", 1))  # fmt: skip
     values = np.empty(len(attribute.data) * width, dtype=np.float64)
     attribute.data.foreach_get(prop, values)
