@@ -56,6 +56,20 @@ def window(blender):
     blender.stop()
 
 
+FROM_THE_FRONT = 15.0
+"""Direction of the view around the vertical, in degrees."""
+
+
+@pytest.fixture
+def pair(blender):
+    """The window with two creatures on the ground, under a lamp."""
+    blender.clicks = 0
+    blender.start(blender.make_scene("pair", "pair.blend"))
+    blender.ask("zoom_to_all", FROM_THE_FRONT)  # so that both can be clicked
+    yield blender
+    blender.stop()
+
+
 @pytest.fixture
 def shot(blender, request):
     """A function that saves a screenshot of the window, numbered in the order of the steps."""
@@ -76,7 +90,7 @@ def shot(blender, request):
 def quiet(request):
     """Fail a test that leaves a warning or an error on the terminal."""
     yield
-    if "window" in request.fixturenames:
+    if {"window", "pair"} & set(request.fixturenames):
         assert complaints(request.getfixturevalue("blender").log()) == []
 
 

@@ -33,6 +33,8 @@ HEADER_HEIGHT = 26
 """Height of the header of a sub-panel, in pixels."""
 ROW_HEIGHT = 21
 """Height of a row in a list, in pixels."""
+COLOR_ACROSS, MENU_ACROSS = 0.11, 0.2
+"""Horizontal positions of the colors in the list of segments and of the menu below it, relative to the width."""
 FIRST_FIELD, FIELD_HEIGHT = 45, 23
 """Distance of the first field of the panel of the last operator from its top, and of each next field, in pixels."""
 TIMEOUT = 600
@@ -295,6 +297,19 @@ class RealBlender:
         """Position of the name of a segment in the list."""
         x, y = self.find("active_segment")
         return x, y + ROW_HEIGHT * index
+
+    def swatch(self, index: int) -> tuple[int, int]:
+        """Position of the color of a segment in the list."""
+        left, _, width, _ = self.ask("region", "UI")
+        return left + int(COLOR_ACROSS * width), self.row(index)[1]
+
+    def merge(self, index: int, into: int) -> None:
+        """Merge a segment of the list into another one, by the menu on the left of Split."""
+        self.click(*self.row(index))
+        left, _, width, _ = self.ask("region", "UI")
+        self.click(left + int(MENU_ACROSS * width), self.find("wks_segment.split_segment")[1])
+        # The menu leaves the segment itself out, and its first item is chosen by one press.
+        self.key(*["Down"] * (into + (into < index)), "Return")
 
     def choose(self, name: str, letter: str) -> None:
         """Open a menu of the side panel and press the underlined letter of an item."""

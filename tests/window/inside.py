@@ -175,6 +175,13 @@ def make_active(name):
     yield from settle()
 
 
+def select_also(*names):
+    """Select objects that cannot be clicked, since they lie inside one another."""
+    for name in names:
+        bpy.data.objects[name].select_set(True, view_layer=_window().view_layer)
+    yield from settle()
+
+
 def edit_material(name, metallic, new_name):
     """Set a value of a material's shader and rename the material, as an artist does in the Properties editor."""
     material = bpy.data.materials[name]
@@ -205,6 +212,11 @@ def job_is_over():
 def n_segments(name, count):
     """Whether an object has a number of segments."""
     return len(segments(name)) == count
+
+
+def other_segments(name, known):
+    """Whether the segments of an object are others than known ones."""
+    return segments(name) != known
 
 
 def groups(name, beginning):
@@ -266,6 +278,7 @@ def _values(mesh, name):
 def _hash_values(attribute):
     prop, width = {
         "FLOAT_VECTOR": ("vector", 3), "FLOAT2": ("vector", 2), "BYTE_COLOR": ("color", 4), "FLOAT_COLOR": ("color", 4),
+        "INT16_2D": ("value", 2), "INT32_2D": ("value", 2), "QUATERNION": ("value", 4), "FLOAT4X4": ("value", 16),
     }.get(attribute.data_type, ("value", 1))  # fmt: skip
     values = np.empty(len(attribute.data) * width, dtype=np.float64)
     attribute.data.foreach_get(prop, values)

@@ -31,11 +31,6 @@ def test_segments_are_renamed_hidden_split_selected_and_assigned_in_the_list(lea
     assert [row[0] for row in learned.ask("rows")][:3] == ["Segment 1", "Torso", "Segment 3"]
     shot("renamed")
 
-    learned.press("wks_segment.hide_segment")  # the eye of the first row
-    assert [row[2] for row in learned.ask("rows")] == [True] + 7 * [False]
-    shot("hidden")
-    learned.press("wks_segment.hide_segment")
-
     learned.click(*learned.row(0))
     before = learned.ask("segments", BODY)
     rows = learned.ask("rows")
@@ -53,6 +48,11 @@ def test_segments_are_renamed_hidden_split_selected_and_assigned_in_the_list(lea
     assert chosen[2] > 0
     assert sum(chosen) == chosen[2]
     shot("selected in edit mode")
+    learned.press("wks_segment.hide_segment")  # the eye of the first row
+    assert [row[2] for row in learned.ask("rows")] == [True] + 7 * [False]
+    shot("hidden")
+    learned.press("wks_segment.hide_segment")
+    assert not any(row[2] for row in learned.ask("rows"))
     learned.click(*learned.row(0))
     learned.press("wks_segment.assign_faces")
     learned.over_viewport()

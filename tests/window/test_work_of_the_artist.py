@@ -76,15 +76,6 @@ def test_an_edited_material_stays(learned, shot):
     shot("cleared")
 
 
-@pytest.fixture
-def pair(blender):
-    """The window with two creatures on the ground, under a lamp."""
-    blender.start(blender.make_scene("pair", "pair.blend"))
-    blender.ask("zoom_to_all")
-    yield blender
-    blender.stop()
-
-
 def test_the_larger_of_two_characters_is_learned_unless_the_other_is_active(pair, shot):
     pair.over_viewport()
     pair.key("a")

@@ -26,6 +26,7 @@ from .operators.save_model import WKS_SEGMENT_OT_save_model
 from .operators.segments_from import WKS_SEGMENT_OT_segments_from
 from .operators.select_segment import WKS_SEGMENT_OT_select_segment
 from .operators.separate import WKS_SEGMENT_OT_separate
+from .operators.show_id_map import WKS_SEGMENT_OT_show_id_map
 from .operators.show_segments import (
     WKS_SEGMENT_OT_hide_segment,
     WKS_SEGMENT_OT_isolate_segment,
@@ -41,6 +42,7 @@ from .props.model_item import WKSModelItem, WKSRankItem
 from .props.segment_item import WKSSegmentItem
 from .props.settings import WKSSegmentSettings
 from .ui import main_panel, menu, models_panel, segments_panel
+from .ui.color_icons import COLOR_ICONS, ColorIcons
 from .ui.preview import ViewportPreview
 from .ui.translations import TRANSLATIONS
 from .ui.viewport_colors import VIEWPORT_COLORS, ViewportColors
@@ -58,6 +60,7 @@ OPERATORS = (
     WKS_SEGMENT_OT_discard,
     WKS_SEGMENT_OT_clear,
     WKS_SEGMENT_OT_bake,
+    WKS_SEGMENT_OT_show_id_map,
     WKS_SEGMENT_OT_unwrap,
     WKS_SEGMENT_OT_separate,
     WKS_SEGMENT_OT_transfer,
@@ -116,6 +119,7 @@ def register() -> None:
     setattr(bpy.types.WindowManager, SESSION, session)
     setattr(bpy.types.WindowManager, ACTIVE_OBJECT, ActiveObject(lambda: session.follow(bpy.context.scene)))
     setattr(bpy.types.WindowManager, VIEWPORT_COLORS, ViewportColors())
+    setattr(bpy.types.WindowManager, COLOR_ICONS, ColorIcons())
     bpy.app.translations.register(__name__, TRANSLATIONS)
     bpy.types.VIEW3D_MT_object.append(menu.draw_in_object_menu)
     _commands.append(bpy.utils.register_cli_command(COMMAND_NAME, run))
@@ -126,7 +130,7 @@ def unregister() -> None:
     bpy.utils.unregister_cli_command(_commands.pop())
     bpy.types.VIEW3D_MT_object.remove(menu.draw_in_object_menu)
     bpy.app.translations.unregister(__name__)
-    for name in (VIEWPORT_COLORS, ACTIVE_OBJECT, SESSION, JOB_HOLDER):
+    for name in (COLOR_ICONS, VIEWPORT_COLORS, ACTIVE_OBJECT, SESSION, JOB_HOLDER):
         getattr(bpy.types.WindowManager, name).close()
         delattr(bpy.types.WindowManager, name)
     del bpy.types.Scene.wks_segment

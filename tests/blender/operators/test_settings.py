@@ -121,12 +121,16 @@ def test_sides_can_be_chosen_in_the_panel(settings):
 @pytest.mark.parametrize("materials", [False, True])
 def test_outputs_can_be_chosen_in_the_panel(settings, materials):
     settings.write_materials = materials
-    shown = [call.args[1] for call in drawn(main_panel.WKS_SEGMENT_PT_outputs).column.return_value.prop.call_args_list]
-    assert {"palette", "write_colors", "vertex_groups", "write_face_sets", "write_seams"} < set(shown)
-    assert ("material_template" in shown) is materials
-    buttons = drawn(main_panel.WKS_SEGMENT_PT_outputs).column.return_value.operator.call_args_list
-    assert {call.args[0] for call in buttons} == {f"wks_segment.{name}" for name in ("unwrap", "separate", "transfer")}
-    drawn(main_panel.WKS_SEGMENT_PT_bake).operator.assert_called_once_with("wks_segment.bake", icon="RENDER_STILL")
+    column = drawn(main_panel.WKS_SEGMENT_PT_outputs).column.return_value
+    shown = [call.args[1] for call in column.prop.call_args_list]
+    expected = {"palette", "write_colors", "vertex_groups", "write_face_sets", "write_seams", "material_template"}
+    assert expected < set(shown)
+    assert column.active is materials, "the template is gray without materials"
+    used = {call.args[0] for call in column.operator.call_args_list}
+    assert used == {f"wks_segment.{name}" for name in ("unwrap", "separate", "transfer")}
+    column = drawn(main_panel.WKS_SEGMENT_PT_bake).column.return_value
+    used = {call.args[0] for call in column.operator.call_args_list}
+    assert used == {"wks_segment.bake", "wks_segment.show_id_map"}
 
 
 def test_panel_wraps_lines_and_keeps_pairs_together(settings):

@@ -380,3 +380,19 @@ def test_command_without_segments_or_model_is_refused(command, tmp_path):
     done = command("bake", tmp_path / "plain.blend", "--output", tmp_path / "map.jpg")
     assert (done.code, ".png" in done.err) == (1, True)
     assert [path.name for path in tmp_path.iterdir()] == ["plain.blend"]
+
+
+def test_the_id_map_opens_in_an_image_editor(labeled):
+    with pytest.raises(RuntimeError, match="No ID map yet: use Bake ID Map"):
+        OPS.show_id_map()
+    OPS.bake()
+    image = bpy.data.images["Limbed ID Map"]
+    before = scene_snapshot()
+    window = bpy.context.window_manager.windows[0]
+    area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
+    with bpy.context.temp_override(window=window, screen=window.screen, area=area):
+        area.type = "IMAGE_EDITOR"
+        assert OPS.show_id_map() == {"FINISHED"}
+        assert area.spaces.active.image == image
+        area.type = "VIEW_3D"
+    assert not changes(before, scene_snapshot())

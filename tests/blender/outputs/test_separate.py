@@ -1,5 +1,7 @@
 """Separate by Segments: separated objects look like the original, move with it, and go with Clear."""
 
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from builders import (
 )
 from painted_objects import painted, stripes
 
+from wks_segment.blender.operators import clear as clear_module
 from wks_segment.blender.outputs.labels import write_labels
 from wks_segment.blender.outputs.options import OutputOptions
 
@@ -108,6 +111,32 @@ def test_a_separated_object_that_was_changed_stays(labeled, printed):
     assert 'You have changed these separated objects, they stay: "Arm", "Segment 1"' in printed().out
     assert sorted(obj.name for obj in bpy.data.objects) == ["Arm", "Limbed", "Segment 1"]
     assert not separated_from(labeled)
+
+
+def question_of_clear(monkeypatch, obj):
+    """What Clear asks in a window where one object is selected; None if it asks nothing."""
+    asked = []
+    monkeypatch.setattr(clear_module._report, "has_window", lambda context: True)
+    manager = SimpleNamespace(invoke_confirm=lambda *_, **texts: asked.append(texts["message"]) or {"RUNNING_MODAL"})
+    window = SimpleNamespace(
+        window_manager=manager, selected_objects=[obj], visible_objects=[obj], scene=bpy.context.scene
+    )
+    operator = SimpleNamespace(execute=lambda context: {"FINISHED"})
+    clear_module.WKS_SEGMENT_OT_clear.invoke(operator, window, None)
+    return asked[0] if asked else None
+
+
+def test_clear_says_which_separated_objects_it_takes(labeled, monkeypatch):
+    assert question_of_clear(monkeypatch, labeled) is None
+    OPS.separate()
+    first, second = separated_from(labeled)[:2]
+    told = 'All 4 objects that were separated from "Limbed" are removed, and it is shown again'
+    assert question_of_clear(monkeypatch, first) == question_of_clear(monkeypatch, labeled) == told
+    second.data.vertices[0].co.x += 0.5
+    assert question_of_clear(monkeypatch, first) == (
+        '3 objects that were separated from "Limbed" are removed, and it is shown again; those that you have changed '
+        f'stay: "{second.name}"'
+    )
 
 
 def test_an_original_is_not_separated_twice(labeled):

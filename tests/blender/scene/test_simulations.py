@@ -126,8 +126,6 @@ CHANGES = {
     "restore": lambda: OPS.restore_segments(),
     "forget": lambda: OPS.forget_faces(),
     "rename and recolor": rename_and_recolor,
-    "hide": lambda: OPS.hide_segment(part=0),
-    "isolate": lambda: OPS.isolate_segment(),
     "show": lambda: OPS.show_segments(),
     "select": lambda: OPS.select_segment(),
     "separate": lambda: OPS.separate(),

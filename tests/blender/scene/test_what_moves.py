@@ -239,6 +239,34 @@ def test_command_line_takes_the_action_that_moves_most_unless_one_is_named(comma
     assert np.unique(labels_of(bpy.data.objects["Walker"])).size == 4
 
 
+def test_ten_actions_of_a_gltf_file_are_named(command, tmp_path, printed):
+    """In the window as on the command line: the one that was taken, and the others."""
+    obj = limbed_rigged(bends=((1, 0.2), (11, 0.2)))
+    obj.parent.animation_data.action.name = "Hold"
+    for i in range(9):
+        action_of(obj.parent, f"Move {i}", 0.0, 0.1 * (i + 1))
+    path = tmp_path / "ten.glb"
+    bpy.ops.export_scene.gltf(filepath=str(path))
+    taken = 'the poses are from the action "Move 8"; others: '
+    done = command("segment", path, "--frames", 2, *QUICK, "--json")
+    (note,) = [note for note in done.result["notes"] if taken in note]
+    assert note.count('"Move') == 8  # with the one that was taken
+    assert note.endswith(" …"), "more than eight others are too many for a line"
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.import_scene.gltf(filepath=str(path))
+    assert len(bpy.data.actions) == 10
+    body = next(obj for obj in bpy.context.scene.objects if obj.find_armature())
+    body.find_armature().animation_data.action = bpy.data.actions["Hold"]
+    settings = bpy.context.scene.wks_segment
+    settings.source, settings.pose_count, settings.n_segments, settings.n_eigenpairs = "FRAMES", 2, 4, 30
+    select(body)
+    printed()
+    assert bpy.ops.wks_segment.learn() == {"FINISHED"}
+    assert taken in printed().out
+    assert taken in settings.model_summary, "the panel shows it as well"
+    assert body.find_armature().animation_data.action.name == "Hold"
+
+
 def test_the_place_of_the_armature_comes_back_and_actions_of_another_rig_are_not_tried(frames):
     obj, other = limbed_rigged(bends=((1, 0.2), (11, 0.2))), walker("Other", 9)
     armature = obj.parent

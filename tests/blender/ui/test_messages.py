@@ -195,7 +195,7 @@ def test_job_and_panel_speak_german(extension, monkeypatch):
     monkeypatch.setattr(messages, "bpy", Blender("de_DE"))
     assert job_texts(job) == ("Signatur von Fox, Frame 12 · 3 von 5", "38 %")
     space = "\N{NO-BREAK SPACE}"
-    assert " ".join(wrapped_lines(job_texts(job)[0])) == f"Signatur von Fox, Frame 12 · 3{space}von{space}5"
+    assert " ".join(wrapped_lines(job_texts(job)[0])) == f"Signatur von Fox, Frame 12 ·{space}3{space}von{space}5"
     job.end()
     assert job_texts(job) == ("Wird abgebrochen", "")
     said = []

@@ -21,7 +21,7 @@ from wks_segment.core import MemoryCache
 from wks_segment.core.progress import Progress
 
 pytestmark = pytest.mark.usefixtures("scene")
-STAGES = ["Starting", "Connecting", "Signature", "Learning", "Labels", "Left and right", "Weights"]
+STAGES = ["Starting", "Connecting", "Signature", "Learning", "Segments", "Left and right", "Weights"]
 
 
 @pytest.mark.usefixtures("learns_anew")
@@ -88,7 +88,7 @@ def test_job_uses_settings_from_its_start(poses, settings, hold_at):
 
 
 def test_model_is_stored_in_the_scene_of_the_job(poses, settings, hold_at):
-    ran, go_on = hold_at("Labels")
+    ran, go_on = hold_at("Segments")
     other = bpy.data.scenes.new("Other")
     bpy.context.window.scene = other
     go_on()
@@ -107,7 +107,7 @@ def test_renamed_object_is_written(poses, hold_at):
 
 def test_writing_waits_for_object_mode(poses, hold_at):
     other = limbed("Other")
-    ran, go_on = hold_at("Labels")
+    ran, go_on = hold_at("Segments")
     select(other)
     bpy.ops.object.mode_set(mode="EDIT")
     go_on()
@@ -135,7 +135,7 @@ def test_escape_cancels_at_every_stage(poses, hold_at, stage):
     assert not changes(before, scene_snapshot())
 
 
-@pytest.mark.parametrize("stage", ["Signature", "Labels", "Weights"])
+@pytest.mark.parametrize("stage", ["Signature", "Segments", "Weights"])
 def test_cancel_button_ends_apply(poses, hold_at, stage):
     OPS.learn()
     before = scene_snapshot()

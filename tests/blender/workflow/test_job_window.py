@@ -13,7 +13,7 @@ from running_jobs import LEARN, OPS, RUNNING, TIMEOUT, CallableOperator, finish_
 from wks_segment.blender.errors import TooLargeError
 from wks_segment.blender.operators import _report
 from wks_segment.blender.ui import main_panel
-from wks_segment.blender.workflow import background_job, live_session
+from wks_segment.blender.workflow import background_job, live_session, passing_message
 from wks_segment.blender.workflow.background_job import TimeLeft, job_holder
 
 pytestmark = pytest.mark.usefixtures("scene")
@@ -80,6 +80,19 @@ def test_large_job_runs_after_the_question(poses, settings, window):
     assert ran.execute(bpy.context) == {"FINISHED"}
 
 
+def test_clear_is_gray_while_a_job_runs(poses, hold_at):
+    select(*poses)
+    assert OPS.learn() == {"FINISHED"}
+    assert OPS.clear.poll()
+    ran, go_on = hold_at("Segments")
+    assert not OPS.clear.poll()
+    with pytest.raises(RuntimeError, match="A job is running"):
+        OPS.clear()
+    go_on()
+    finish_job(ran)
+    assert OPS.clear() == {"FINISHED"}
+
+
 def test_refusal_is_reported_in_the_window(settings, window):
     settings.source = "SHAPE_KEYS"
     select(limbed())
@@ -91,30 +104,36 @@ def test_refusal_is_reported_in_the_window(settings, window):
 
 
 def drawn():
-    """The layout that the main panel was drawn on."""
+    """What the place for messages shows: its texts as one, and the row of the progress bar."""
     layout = MagicMock()
     cls = main_panel.WKS_SEGMENT_PT_main
-    cls.draw(type("Shown", (cls.__bases__[0],), {"layout": layout})(), bpy.context)
-    return layout.column.return_value
+    shown = type("Shown", (cls.__bases__[0],), {"layout": layout})()
+    shown.status(bpy.context)
+    column = layout.column.return_value
+    labels = [*column.row.return_value.label.call_args_list, *column.column.return_value.label.call_args_list]
+    return " ".join(call.kwargs["text"] for call in labels).strip(), column.row.return_value
 
 
-def test_panel_shows_progress_and_why_a_job_ended(poses, hold_at):
-    assert not drawn().row.return_value.progress.called
+def test_panel_shows_progress_and_why_a_job_ended(poses, hold_at, monkeypatch):
+    text, row = drawn()
+    assert text == "No segments yet: learn a model, or apply one"
+    assert not row.progress.called
     ran, go_on = hold_at("Signature")
     job = job_holder(bpy.context).job
     job.stage, job.share = 'Signature of "Fox, frame 12" (3 of 5)', 0.375
-    column = drawn()
-    lines = [call.kwargs["text"] for call in column.label.call_args_list]
-    assert " ".join(lines) == "Signature of Fox, frame 12 · 3\N{NO-BREAK SPACE}of\N{NO-BREAK SPACE}5"
-    column.row.return_value.progress.assert_called_once_with(factor=0.375, text="38 %")
-    assert column.row.return_value.operator.call_args.args == ("wks_segment.cancel",)
+    text, row = drawn()
+    assert text == "Signature of Fox, frame 12 ·\N{NO-BREAK SPACE}3\N{NO-BREAK SPACE}of\N{NO-BREAK SPACE}5"
+    row.progress.assert_called_once_with(factor=0.375, text="38 %")
+    assert row.operator.call_args.args == ("wks_segment.cancel",)
     OPS.cancel()
     go_on()
     finish_job(ran)
-    column = drawn()
-    lines = [call.kwargs["text"] for call in column.label.call_args_list]
-    assert " ".join(lines) == "Learn and Segment was canceled, nothing is written"
-    assert not column.row.return_value.progress.called
+    text, row = drawn()
+    assert text == "Learn and Segment was canceled, nothing is written"
+    assert not row.progress.called
+    begun = time.monotonic()
+    monkeypatch.setattr(passing_message.time, "monotonic", lambda: begun + passing_message.MESSAGE_SECONDS + 1)
+    assert drawn()[0] == "No segments yet: learn a model, or apply one", "the message has gone away"
 
 
 @pytest.mark.parametrize(
@@ -125,9 +144,13 @@ def test_panel_shows_progress_and_why_a_job_ended(poses, hold_at):
         ([(10.0, 0.01)], ""),
         ([(10.0, 0.25)], "about 30 s left"),
         ([(30.0, 0.9)], "a few seconds left"),
-        ([(60.0, 0.1)], "about 9 min left"),
-        ([(10.0, 0.25), (10.1, 0.5)], "about 30 s left"),
-        ([(10.0, 0.25)] + [(t, 0.5) for t in np.arange(10.1, 20, 0.1)], "about 15 s left"),
+        ([(60.0, 0.1)], ""),
+        ([(60.0, 0.2)], "about 4 min left"),
+        # What has just risen counts by as much as it has risen.
+        ([(10.0, 0.25), (10.1, 0.5)], "about 20 s left"),
+        # While it stands the time runs down, but not out.
+        ([(10.0, 0.25), (20.0, 0.25)], "about 30 s left"),
+        ([(10.0, 0.25)] + [(t, 0.25) for t in np.arange(10.1, 42, 0.1)], "about 65 s left"),
     ],
 )
 def test_time_left(told, text):

@@ -20,7 +20,7 @@ from height_bands import RED, activate, all_agrees, bands, colors_at, groups_of,
 from wks_segment.blender import registration
 from wks_segment.blender.parts.palette import palette
 from wks_segment.blender.parts.part_style import SetNotes
-from wks_segment.blender.ui import segments_panel
+from wks_segment.blender.ui import color_icons, segments_panel
 from wks_segment.core import PoseSegmentation
 
 pytestmark = pytest.mark.usefixtures("scene")
@@ -208,14 +208,13 @@ def hidden_faces(obj):
     return hidden
 
 
-@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
-def test_hide_isolate_and_show(pair, settings, mode):
-    bpy.ops.object.mode_set(mode=mode)
+def test_hide_isolate_and_show(pair, settings):
+    bpy.ops.object.mode_set(mode="EDIT")
     item = activate(settings, 1)
     assert OPS.hide_segment() == {"FINISHED"}
     assert OPS.hide_segment(part=2002) == {"FINISHED"}
     assert [item.hidden for item in settings.segments] == [False, True, False, True]
-    assert bpy.context.object.mode == mode
+    assert bpy.context.mode == "EDIT_MESH"
     bpy.ops.object.mode_set(mode="OBJECT")
     for obj in pair:
         np.testing.assert_array_equal(hidden_faces(obj), np.isin(bands(obj), (1, 2002)))
@@ -223,16 +222,56 @@ def test_hide_isolate_and_show(pair, settings, mode):
         assert {vertex.index for vertex in obj.data.vertices if not vertex.hide} == shown
         edges = {key for face in obj.data.polygons if not face.hide for key in face.edge_keys}
         assert {edge.key for edge in obj.data.edges if not edge.hide} == edges
-    bpy.ops.object.mode_set(mode=mode)
+    bpy.ops.object.mode_set(mode="EDIT")
     OPS.hide_segment(part=1)
     assert not settings.segments[1].hidden
     activate(settings, item.number)
     OPS.isolate_segment()
     assert [item.hidden for item in settings.segments] == [True, False, True, True]
-    OPS.show_segments()
     bpy.ops.object.mode_set(mode="OBJECT")
+    assert hidden_faces(pair[0]).any()
+    OPS.show_segments()
     assert not any(hidden_faces(obj).any() for obj in pair)
     assert not any(edge.hide for edge in pair[0].data.edges)
+
+
+def test_the_eye_is_open_and_gray_where_blender_shows_hidden_faces(pair, settings):
+    """In Object Mode, that is."""
+    bpy.ops.object.mode_set(mode="EDIT")
+    activate(settings, 1)
+    OPS.hide_segment()
+    assert eye(settings, 1) == "HIDE_ON"
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert eye(settings, 1) == "HIDE_OFF"
+    for operator in (OPS.hide_segment, OPS.isolate_segment):
+        with pytest.raises(RuntimeError, match="Switch to Edit Mode first: Object Mode also shows hidden faces"):
+            operator()
+
+
+def eye(settings, index):
+    """Icon of the eye in a row of the list."""
+    layout = MagicMock()
+    row = settings.segments[index]
+    segments_panel.WKS_SEGMENT_UL_segments.draw_item(
+        MagicMock(), bpy.context, layout, settings, row, 0, settings, "", 0, 0
+    )
+    return layout.row.return_value.operator.call_args.kwargs["icon"]
+
+
+def test_menu_of_segments_shows_their_colors(pair, settings, monkeypatch):
+    layout, asked = MagicMock(), []
+    # Without a window all icons have the number 0.
+    monkeypatch.setattr(color_icons.ColorIcons, "icon", lambda self, color: asked.append(tuple(color)) or len(asked))
+    activate(settings, 0)
+    settings.segments[1].color = RED
+    segments_panel.WKS_SEGMENT_MT_merge.draw(MagicMock(layout=layout), bpy.context)
+    assert [call.kwargs["icon_value"] for call in layout.operator.call_args_list] == [1, 2, 3]
+    assert asked == [tuple(row.color) for row in settings.segments[1:]]
+    icons = color_icons.color_icons_of(bpy.context)
+    pixels = np.array(icons.preview(RED).icon_pixels_float).reshape(2 * [color_icons.ICON_PIXELS] + [4])
+    np.testing.assert_allclose(pixels[16, 16], (*RED, 1.0))
+    assert pixels[0, 0, 3] == 0
+    assert icons.preview(RED) == icons.preview(RED), "a color has one icon"
 
 
 def drawn(layout):
@@ -262,9 +301,3 @@ def test_panel_menus_and_rows_can_be_drawn(pair, settings, mode):
     assert used <= {cls.bl_idname for cls in registration.OPERATORS}
     assert ("wks_segment.assign_faces" in used) == (mode == "EDIT")
     assert ("wks_segment.split_segment" in used) == (mode == "OBJECT")
-
-
-def test_panel_says_what_to_do_without_segments(settings):
-    layout = MagicMock()
-    segments_panel.WKS_SEGMENT_PT_segments.draw(MagicMock(layout=layout), bpy.context)
-    assert "learn a model" in str(layout.mock_calls)

@@ -24,8 +24,6 @@ STEPS = {
     "name": lambda settings: OPS.name_segment(name="Torso"),
     "merge": merge,
     "split": lambda settings: OPS.split_segment(),
-    "hide": lambda settings: OPS.hide_segment(),
-    "isolate": lambda settings: OPS.isolate_segment(),
     "select": lambda settings: OPS.select_segment(),
     "restore": lambda settings: OPS.restore_segments(),
     "forget": lambda settings: OPS.forget_faces(),
@@ -55,7 +53,7 @@ def test_undo_restores_everything(pair, settings, step):
         assert not changes(after, {**scene_snapshot(), "active": after["active"]})
 
 
-@pytest.mark.parametrize("step", ["assign", "new", "forget"])
+@pytest.mark.parametrize("step", ["assign", "new", "forget", "hide", "isolate"])
 def test_undo_in_edit_mode_restores_everything(pair, settings, step):
     activate(settings, 0)
     if step == "forget":
@@ -66,7 +64,10 @@ def test_undo_in_edit_mode_restores_everything(pair, settings, step):
     before = scene_snapshot()
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.ed.undo_push(message="before")
-    run = {"assign": OPS.assign_faces, "new": OPS.new_segment, "forget": OPS.forget_faces}[step]
+    run = {
+        "assign": OPS.assign_faces, "new": OPS.new_segment, "forget": OPS.forget_faces, "hide": OPS.hide_segment,
+        "isolate": OPS.isolate_segment,
+    }[step]  # fmt: skip
     assert run() == {"FINISHED"}
     bpy.ops.ed.undo_push(message="after")
     assert bpy.ops.ed.undo() == {"FINISHED"}

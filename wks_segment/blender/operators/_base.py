@@ -21,8 +21,9 @@ from ..scene.poses import Pose
 from ..ui.messages import in_panel
 from ..workflow import pipeline
 from ..workflow.all_or_nothing import all_or_nothing
-from ..workflow.background_job import BackgroundJob, job_holder, redraw_sidebars
+from ..workflow.background_job import BackgroundJob, job_holder
 from ..workflow.live_session import session_of
+from ..workflow.passing_message import redraw_sidebars
 from ..workflow.segmentation_job import SegmentationJob
 from . import _report
 from ._needs import Need

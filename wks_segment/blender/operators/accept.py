@@ -13,7 +13,7 @@ from .update import write_update
 
 
 class WKS_SEGMENT_OT_accept(BaseOperator, bpy.types.Operator):
-    """Write the previewed segments"""
+    """Write the segments that the preview shows"""
 
     bl_idname = "wks_segment.accept"
     bl_label = "Accept"

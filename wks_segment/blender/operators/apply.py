@@ -11,10 +11,14 @@ from ._base import LabelOperator
 
 
 class WKS_SEGMENT_OT_apply(LabelOperator, bpy.types.Operator):
-    """Find the segments of the model in the selected objects: other poses, levels of detail or characters"""
+    """Apply to Selected."""
 
     bl_idname = "wks_segment.apply"
     bl_label = "Apply to Selected"
+    bl_description = (
+        "Find the segments of the model in the selected objects: other poses, levels of detail or characters. "
+        "Needs a model. Your own materials, groups and attributes stay"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     needs = (_needs.model, _needs.no_job, _needs.object_mode, _needs.selected_mesh)

@@ -25,10 +25,13 @@ def _stored_ranking(context: bpy.types.Context) -> Message | None:
 
 
 class WKS_SEGMENT_OT_apply_ranked(LabelOperator, bpy.types.Operator):
-    """Apply a model of the ranking, with its names and colors, to the ranked character"""
+    """Apply Ranked Model."""
 
     bl_idname = "wks_segment.apply_ranked"
     bl_label = "Apply Ranked Model"
+    bl_description = (
+        "Apply this model of the ranking to the ranked character, with its names and colors. The other models stay"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     needs = (_stored_ranking, _needs.no_job, _needs.object_mode)

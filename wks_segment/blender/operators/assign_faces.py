@@ -20,10 +20,14 @@ def _faces_by_hand(context: bpy.types.Context) -> Message | None:
 
 
 class WKS_SEGMENT_OT_assign_faces(BaseOperator, bpy.types.Operator):
-    """Assign the selected faces to the active segment, also when the model is applied again"""
+    """Assign Faces to Segment."""
 
     bl_idname = "wks_segment.assign_faces"
     bl_label = "Assign Faces to Segment"
+    bl_description = (
+        "Assign the selected faces to the active segment. They stay there when settings change or a model is "
+        "applied, until Forget or Clear"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     needs = (_needs.edit_mode, _needs.active_segment)
@@ -33,10 +37,14 @@ class WKS_SEGMENT_OT_assign_faces(BaseOperator, bpy.types.Operator):
 
 
 class WKS_SEGMENT_OT_new_segment(BaseOperator, bpy.types.Operator):
-    """Make a new segment of the selected faces"""
+    """New Segment from Faces."""
 
     bl_idname = "wks_segment.new_segment"
     bl_label = "New Segment from Faces"
+    bl_description = (
+        "Make a new segment of the selected faces. It stays when settings change or a model is applied, until "
+        "Forget or Clear"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     needs = (_needs.edit_mode, _needs.active_segment)
@@ -50,10 +58,14 @@ class WKS_SEGMENT_OT_new_segment(BaseOperator, bpy.types.Operator):
 
 
 class WKS_SEGMENT_OT_forget_faces(BaseOperator, bpy.types.Operator):
-    """Give the selected faces, or all faces in Object Mode, the segment of the model again"""
+    """Forget Faces Assigned by Hand."""
 
     bl_idname = "wks_segment.forget_faces"
     bl_label = "Forget Faces Assigned by Hand"
+    bl_description = (
+        "Give the selected faces, in Object Mode all faces, the segment of the model again. Names, colors and "
+        "merges stay"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     needs = (_needs.object_or_edit_mode, _needs.active_segment, _faces_by_hand)

@@ -12,10 +12,14 @@ from ._base import BaseOperator
 
 
 class WKS_SEGMENT_OT_bake(BaseOperator, bpy.types.Operator):
-    """Bake the segments of the selected objects to an image of flat colors, with Cycles on the CPU"""
+    """Bake ID Map."""
 
     bl_idname = "wks_segment.bake"
     bl_label = "Bake ID Map"
+    bl_description = (
+        "Bake the segments of the selected objects to an image of flat colors, with Cycles on the CPU. Needs a UV "
+        "map, or Unwrap if Needed. Nothing else in the scene changes"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     needs = (_needs.no_job, _needs.object_mode, _needs.labeled_mesh)

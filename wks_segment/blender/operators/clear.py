@@ -9,7 +9,7 @@ from ..errors import UserError
 from ..outputs.labels import clear_labels
 from ..outputs.overrides import faces_by_hand
 from ..outputs.part_attributes import has_labels
-from ..outputs.separate import original_of, unite
+from ..outputs.separate import is_as_made, original_of, separated_from, unite
 from ..scene.characters import check_not_edited, quoted, selected_meshes
 from ..ui.messages import in_panel
 from ..workflow import segment_list
@@ -18,19 +18,22 @@ from ._base import BaseOperator
 
 
 class WKS_SEGMENT_OT_clear(BaseOperator, bpy.types.Operator):
-    """Remove everything that was written to the selected objects; asks first if faces were assigned by hand"""
+    """Clear."""
 
     bl_idname = "wks_segment.clear"
     bl_label = "Clear"
+    bl_description = (
+        "Remove everything that was written to the selected objects, and nothing else. Asks first if that takes faces "
+        "assigned by hand or separated objects"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
-    needs = (_needs.object_mode, _needs.labeled_mesh)
+    needs = (_needs.no_job, _needs.object_mode, _needs.labeled_mesh)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        count = sum(faces_by_hand(mesh) for mesh in {obj.data for obj in selected_meshes(context)})
-        if not count or not _report.has_window(context):
+        message = Message.joined(". ", _losses(selected_meshes(context)))
+        if not message or not _report.has_window(context):
             return self.execute(context)
-        message = Message("{count} faces that were assigned by hand are cleared as well", count=count)
         return context.window_manager.invoke_confirm(
             self, event, title=in_panel("Clear"), message=in_panel(message), confirm_text=in_panel("Clear")
         )
@@ -65,3 +68,25 @@ class WKS_SEGMENT_OT_clear(BaseOperator, bpy.types.Operator):
             _report.tell(self, {"WARNING"}, Message(template, names=quoted(kept)))
         _report.tell_warnings(self, warnings)
         return {"FINISHED"}
+
+
+def _losses(selected: list[bpy.types.Object]) -> list[Message]:
+    """What Clear takes from the user that does not come back with Apply."""
+    losses = []
+    count = sum(faces_by_hand(mesh) for mesh in {obj.data for obj in selected})
+    if count:
+        losses.append(Message("{count} faces that were assigned by hand are cleared as well", count=count))
+    originals = [original for obj in selected if (original := original_of(obj)) is not None]
+    for original in dict.fromkeys(originals):
+        separated = separated_from(original)
+        removed = [obj for obj in separated if is_as_made(obj)]
+        kept = [obj.name for obj in separated if obj not in removed]
+        if separated:
+            template = 'All {count} objects that were separated from "{object}" are removed, and it is shown again'
+            if kept:
+                template = (
+                    '{count} objects that were separated from "{object}" are removed, and it is shown again; those '
+                    "that you have changed stay: {names}"
+                )
+            losses.append(Message(template, count=len(removed), object=original.name, names=quoted(kept)))
+    return losses

@@ -10,7 +10,7 @@ from ._base import BaseOperator
 
 
 class WKS_SEGMENT_OT_discard(BaseOperator, bpy.types.Operator):
-    """Hide the previewed segments, and restore the settings of the written ones"""
+    """Hide the previewed segments and set the fields back. The written segments stay"""
 
     bl_idname = "wks_segment.discard"
     bl_label = "Discard"

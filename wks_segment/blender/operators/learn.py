@@ -11,10 +11,14 @@ from ._base import LabelOperator
 
 
 class WKS_SEGMENT_OT_learn(LabelOperator, bpy.types.Operator):
-    """Learn the segments of a character from its poses, and color them"""
+    """Learn and Segment."""
 
     bl_idname = "wks_segment.learn"
     bl_label = "Learn and Segment"
+    bl_description = (
+        "Learn the segments of the selected character from its poses, and color them. Needs poses that differ. "
+        "Your own materials, groups and attributes stay"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     needs = (_needs.no_job, _needs.object_mode, _needs.selected_mesh)

@@ -17,10 +17,14 @@ from ._base import BaseOperator
 
 
 class WKS_SEGMENT_OT_load_model(BaseOperator, bpy.types.Operator, ImportHelper):
-    """Add a model from a file to the models of this scene, and use it"""
+    """Import Model."""
 
     bl_idname = "wks_segment.load_model"
     bl_label = "Import Model"
+    bl_description = (
+        "Add a model from a file to the models of this scene, and use it. Segments of objects stay as they are "
+        "until it is applied"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     filename_ext = ".json"

@@ -20,10 +20,14 @@ def _two_segments(context: bpy.types.Context) -> Message | None:
 
 
 class WKS_SEGMENT_OT_merge_segments(BaseOperator, bpy.types.Operator):
-    """Merge the active segment into another, also when the model is applied again"""
+    """Merge Segment Into."""
 
     bl_idname = "wks_segment.merge_segments"
     bl_label = "Merge Segment Into"
+    bl_description = (
+        "Merge the active segment into another one, also when the model is applied again. Only objects with the "
+        "same segments of this model change"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     needs = (_needs.object_mode, _needs.active_segment, _two_segments)

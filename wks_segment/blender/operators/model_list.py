@@ -12,10 +12,13 @@ from ._base import BaseOperator
 
 
 class WKS_SEGMENT_OT_use_model(BaseOperator, bpy.types.Operator):
-    """Use a model of this scene, with its names and colors; labels stay until it is applied"""
+    """Use Model."""
 
     bl_idname = "wks_segment.use_model"
     bl_label = "Use Model"
+    bl_description = (
+        "Use a model of this scene, with its names and colors. Segments of objects stay as they are until it is applied"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     needs = (_needs.model,)
@@ -51,7 +54,7 @@ class WKS_SEGMENT_OT_duplicate_model(BaseOperator, bpy.types.Operator):
 
 
 class WKS_SEGMENT_OT_remove_model(BaseOperator, bpy.types.Operator):
-    """Remove the active model from this scene; labels that it has written stay"""
+    """Remove the active model from this scene. Segments that it gave stay"""
 
     bl_idname = "wks_segment.remove_model"
     bl_label = "Remove Model"

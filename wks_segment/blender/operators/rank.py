@@ -23,10 +23,14 @@ def _any_model(context: bpy.types.Context) -> Message | None:
 
 
 class WKS_SEGMENT_OT_rank(JobOperator[RankingJob], bpy.types.Operator):
-    """Rank the models of this scene and of the model folder by how well they fit the active character"""
+    """Rank Models."""
 
     bl_idname = "wks_segment.rank"
     bl_label = "Rank Models"
+    bl_description = (
+        "Rank the models of this scene and of the model folder by how well they fit the active character. Nothing "
+        "is applied"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     needs = (_any_model, _needs.no_job, _needs.object_mode, _needs.selected_mesh)

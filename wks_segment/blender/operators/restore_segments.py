@@ -26,7 +26,7 @@ def _edited_segments(context: bpy.types.Context) -> Message | None:
 
 
 class WKS_SEGMENT_OT_restore_segments(BaseOperator, bpy.types.Operator):
-    """Undo all merging, splitting and assigning by hand; names and colors stay"""
+    """Take back all merging, splitting and assigning by hand. Names and colors stay"""
 
     bl_idname = "wks_segment.restore_segments"
     bl_label = "Restore Segments of the Model"

@@ -29,10 +29,14 @@ NEW_NAME = "New Segment"
 
 
 class WKS_SEGMENT_OT_segments_from(BaseOperator, bpy.types.Operator):
-    """Take the segments of the selected objects from what you have drawn or assigned, and write all outputs again"""
+    """Segments From."""
 
     bl_idname = "wks_segment.segments_from"
     bl_label = "Segments From"
+    bl_description = (
+        "Take the segments of the selected objects from face sets, materials or vertex groups that you changed, "
+        "and write all outputs again. Changed faces count as assigned by hand"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     needs = (_needs.no_job, _needs.object_mode, _needs.selected_mesh)

@@ -15,7 +15,7 @@ from ._base import BaseOperator
 
 
 class WKS_SEGMENT_OT_select_segment(BaseOperator, bpy.types.Operator):
-    """Select the faces of the active segment in Edit Mode, with Shift in addition to the selection"""
+    """Select the faces of the active segment in Edit Mode. Shift keeps the selection"""
 
     bl_idname = "wks_segment.select_segment"
     bl_label = "Select Segment"

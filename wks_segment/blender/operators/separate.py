@@ -16,10 +16,13 @@ from ._base import BaseOperator
 
 
 class WKS_SEGMENT_OT_separate(BaseOperator, bpy.types.Operator):
-    """Make an object of each segment of the selected objects, which are hidden until Clear"""
+    """Separate by Segments."""
 
     bl_idname = "wks_segment.separate"
     bl_label = "Separate by Segments"
+    bl_description = (
+        "Make an object of each segment of the selected objects. The originals are hidden, and Clear brings them back"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     needs = (_needs.no_job, _needs.object_mode, _needs.labeled_mesh)

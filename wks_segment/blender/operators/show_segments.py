@@ -17,12 +17,19 @@ from . import _needs, _report
 from ._base import BaseOperator
 
 
+def _mode_that_hides(context: bpy.types.Context) -> Message | None:
+    """A message outside of Edit Mode of a mesh."""
+    if context.mode == "EDIT_MESH":
+        return None
+    return Message("Switch to Edit Mode first: Object Mode also shows hidden faces")
+
+
 class _HidesFaces(BaseOperator):
     """Shared by the three operators, which say for each face whether it is hidden."""
 
     bl_options = {"REGISTER", "UNDO"}
 
-    needs = (_needs.object_or_edit_mode, _needs.active_segment)
+    needs = (_mode_that_hides, _needs.active_segment)
 
     def hidden(self, labels: IntArray, before: BoolArray, settings: bpy.types.PropertyGroup) -> BoolArray:
         """(p,) whether each face is hidden afterward, given the part of each and whether it was hidden before."""
@@ -40,12 +47,7 @@ class _HidesFaces(BaseOperator):
                     _hide(mesh, hidden)
                     count += int(hidden.sum())
             segment_list.fill(settings)
-        if not count:
-            message = Message("No faces are hidden")
-        elif context.mode == "OBJECT":
-            message = Message("{count} faces are hidden in Edit Mode, Sculpt Mode and while painting", count=count)
-        else:
-            message = Message("{count} faces are hidden", count=count)
+        message = Message("{count} faces are hidden", count=count) if count else "No faces are hidden"
         _report.tell(self, {"INFO"}, message)
         return {"FINISHED"}
 
@@ -68,7 +70,7 @@ class WKS_SEGMENT_OT_hide_segment(_HidesFaces, bpy.types.Operator):
 
 
 class WKS_SEGMENT_OT_isolate_segment(_HidesFaces, bpy.types.Operator):
-    """Hide all faces except those of the active segment"""
+    """Hide all faces except those of the active segment, in Edit Mode, Sculpt Mode and while painting"""
 
     bl_idname = "wks_segment.isolate_segment"
     bl_label = "Isolate Segment"
@@ -82,6 +84,8 @@ class WKS_SEGMENT_OT_show_segments(_HidesFaces, bpy.types.Operator):
 
     bl_idname = "wks_segment.show_segments"
     bl_label = "Show All Segments"
+
+    needs = (_needs.object_or_edit_mode, _needs.active_segment)
 
     def hidden(self, labels: IntArray, before: BoolArray, settings: bpy.types.PropertyGroup) -> BoolArray:
         return np.zeros_like(before)

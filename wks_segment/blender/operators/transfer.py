@@ -36,10 +36,14 @@ def _other_selected_mesh(context: bpy.types.Context) -> Message | None:
 
 
 class WKS_SEGMENT_OT_transfer(BaseOperator, bpy.types.Operator):
-    """Give the segments of the active object to the other selected ones, such as an outfit, by the nearest surface"""
+    """Transfer to Selected."""
 
     bl_idname = "wks_segment.transfer"
     bl_label = "Transfer to Selected"
+    bl_description = (
+        "Give the segments of the active object to the other selected ones, such as an outfit, by the nearest "
+        "surface. The active object stays as it is"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     needs = (_needs.no_job, _needs.object_mode, _labeled_active_object, _other_selected_mesh)

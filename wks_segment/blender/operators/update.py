@@ -17,10 +17,14 @@ def _labels_of_a_model(context: bpy.types.Context) -> Message | None:
 
 
 class WKS_SEGMENT_OT_update(JobOperator[UpdateJob], bpy.types.Operator):
-    """Update the segments of the selected objects to the current settings, each by its own model"""
+    """Update Segments."""
 
     bl_idname = "wks_segment.update"
     bl_label = "Update Segments"
+    bl_description = (
+        "Update the segments of the selected objects to the settings, each by its own model. Needs no new "
+        "learning. Faces by hand stay"
+    )
     bl_options = {"UNDO"}
 
     needs = (_labels_of_a_model, _needs.no_job, _needs.object_mode)

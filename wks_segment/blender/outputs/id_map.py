@@ -92,6 +92,11 @@ def write_id_map(
     return image
 
 
+def id_map_of(mesh: bpy.types.Mesh) -> bpy.types.Image | None:
+    """The ID map that was baked of a mesh; None if there is none."""
+    return _our_image(Ledger(mesh).get("id_map", ""))
+
+
 def save_image(image: bpy.types.Image, path: Path) -> None:
     """Write an image to a .png file, which appears whole; UserError if it cannot be written."""
     image.file_format = "PNG"

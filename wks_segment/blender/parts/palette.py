@@ -90,7 +90,8 @@ RECIPES = {
     ),
     "color_blind": Recipe(
         "Color-Blind Safe", "Can be told apart by people without cones for red, green or blue, partly by lightness",
-        (0.25, 0.97), (0.04, 0.40), (0.66, 0.97), (0.25, 0.60), radians(90), color_blind=True,
+        # Darker colors would differ more, but look black in solid shading.
+        (0.45, 0.97), (0.04, 0.40), (0.72, 0.97), (0.45, 0.64), radians(90), color_blind=True,
     ),
 }  # fmt: skip
 

@@ -31,7 +31,7 @@ class WKSSegmentPreferences(bpy.types.AddonPreferences):
     )  # fmt: skip
     live_seconds: FloatProperty(
         name="Live up to Seconds",
-        description="Labels that took longer than this the last time do not follow the settings by themselves",
+        description="Segments that took longer than this the last time do not follow the settings by themselves",
         default=5.0, min=0.0, max=600.0, soft_max=30.0, precision=1,
     )  # fmt: skip
 

@@ -38,7 +38,8 @@ LABEL_SETTINGS: dict[str, dict[str, Any]] = {
     },
     "sides": {
         "name": "Sides",
-        "description": "Whether left and right parts of a segment are told apart; left is where X points at rest",
+        "description": "Whether left and right parts of a segment are told apart; left is as bones are named, or where "
+        "X points at rest",
         "items": [
             ("one", "One Part for Both", "Both sides have the same number, name and color"),
             (
@@ -52,7 +53,7 @@ LABEL_SETTINGS: dict[str, dict[str, Any]] = {
     },
     "smoothness": {
         "name": "Smoothness",
-        "description": "Smoothness of the borders; at zero every vertex keeps the label of its own signature",
+        "description": "Smoothness of the borders; at zero every vertex keeps the segment of its own signature",
         "default": 1.0, "min": 0.0, "max": 10.0, "soft_max": 3.0, "precision": 2,
     },
     "min_share": {
@@ -139,7 +140,8 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
     sides: EnumProperty(**LABEL_SETTINGS["sides"], update=_labels_outdated)
     live: BoolProperty(
         name="Live",
-        description="Update the labels at once when a setting of the segments changes, unless that takes long",
+        description="Update the segments of the selected objects at once when a setting changes, unless that takes "
+        "long",
         default=True,
         update=_labels_outdated,
     )
@@ -214,7 +216,7 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         description="How the segments are learned",
         items=[
             ("default", "Robust", "The method that measures best on unseen poses and bodies"),
-            ("paper", "As in the Paper", "A mixture of the signatures themselves, with its components as labels"),
+            ("paper", "As in the Paper", "A mixture of the signatures themselves, with its components as segments"),
         ],
         default="default",
     )
@@ -315,7 +317,7 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
 
     models: CollectionProperty(type=WKSModelItem, name="Models", description="Models of this scene")
     active_model: IntProperty(
-        name="Active Model", description="Model in use, with its own labels, names and colors", min=0, max=9999,
+        name="Active Model", description="Model in use, with its own segments, names and colors", min=0, max=9999,
         update=_model_chosen,
     )  # fmt: skip
     used_model: IntProperty(

@@ -8,14 +8,17 @@ from typing import Any
 
 import bpy
 
-from ...core.message import Message
 from ..props.presets import WKS_SEGMENT_PT_presets
-from ..workflow.background_job import BackgroundJob, job_holder
-from ..workflow.live_session import ASLEEP, session_of
+from ..workflow.background_job import job_holder
+from ..workflow.live_session import session_of
 from .messages import in_panel
+from .status import job_texts, status
 
 SIDEBAR_LETTERS = 36
 """Letters in a line of the sidebar at its default width, about: Blender cuts off the rest."""
+STATUS_LINES, LINE_HEIGHT = 4, 0.8
+"""Lines that are kept free for messages, and the height of all but the first of them. With fewer the panels below would
+move when a message comes; with more the panel would have a hole."""
 
 
 class _Sidebar:
@@ -46,44 +49,49 @@ class _Sidebar:
         number.prop(settings, "n_segments")
         column.prop(settings, "auto_segments")
 
+    def frame_range(self, context: bpy.types.Context) -> None:
+        """Show the range of frames in one row, gray if poses are no frames."""
+        settings = context.scene.wks_segment
+        row = self.layout.row(align=True, heading="Frame Range")
+        row.enabled = settings.source == "FRAMES"
+        row.prop(settings, "use_frame_range", text="")
+        numbers = row.row(align=True)
+        numbers.active = settings.use_frame_range
+        numbers.prop(settings, "frame_first", text="")
+        numbers.prop(settings, "frame_last", text="")
+
     def live(self, context: bpy.types.Context) -> None:
-        """Show whether labels follow the settings, and if not, why not and the button to update them."""
+        """Show whether labels follow the settings, and the button to update them, or to accept a preview."""
         settings, session = context.scene.wks_segment, session_of(context)
         self.settings(context, "live")
-        if not session.can_update(context.scene):
-            return
         row = self.layout.row()
         row.use_property_split, row.enabled = True, settings.live
         row.prop(settings, "preview")
-        column = self.layout.column(align=True)
+        row = self.layout.row(align=True)
         if session.proposed is not None:
-            row = column.row(align=True)
             row.operator("wks_segment.accept", icon="CHECKMARK")
             row.operator("wks_segment.discard", icon="X")
             return
-        slow, asleep = session.is_slow, not session.holds(context.scene)
-        if settings.live and slow:
-            text = Message("Labels take {seconds:.0f} seconds here, too long to update live", seconds=session.seconds)
-            for line in wrapped(text):
-                column.label(text=line)
-        for line in wrapped(session.message or (ASLEEP if settings.live and asleep else "")):
-            column.label(text=line)
-        if asleep or (not session.is_current(context.scene) and not session.is_scheduled):
-            column.operator("wks_segment.update", icon="FILE_REFRESH")
+        asleep = not session.holds(context.scene)
+        row.active = asleep or (not session.is_current(context.scene) and not session.is_scheduled)
+        row.operator("wks_segment.update", icon="FILE_REFRESH")
 
-    def job(self, context: bpy.types.Context) -> None:
-        """Show the stage and the progress of the running job, or why the last one ended."""
-        holder = job_holder(context)
-        stage, left = job_texts(holder.job) if holder.job is not None else (in_panel(holder.message), "")
-        if not stage:
-            return
+    def status(self, context: bpy.types.Context) -> None:
+        """Show the running job, or else what is to be said; the height is the same, so that nothing moves."""
+        job = job_holder(context).job
         column = self.layout.column(align=True)
-        for line in wrapped_lines(stage):
-            column.label(text=line)
-        if holder.job is not None:
-            row = column.row(align=True)
-            row.progress(factor=holder.job.share, text=left)
-            row.operator("wks_segment.cancel", text="", icon="CANCEL")
+        first, below = column.row(align=True), column.column(align=True)
+        below.scale_y = LINE_HEIGHT
+        if job is None:
+            line, *lines = wrapped(status(context))
+            first.label(text=line)
+        else:
+            stage, left = job_texts(job)
+            lines = wrapped_lines(stage)
+            first.progress(factor=job.share, text=left)
+            first.operator("wks_segment.cancel", text="", icon="CANCEL")
+        for line in [*lines, *[""] * (STATUS_LINES - 1 - len(lines))]:
+            below.label(text=line)
 
 
 class WKS_SEGMENT_PT_main(_Sidebar, bpy.types.Panel):
@@ -98,10 +106,7 @@ class WKS_SEGMENT_PT_main(_Sidebar, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         settings = self.settings(context, "source")
         self.settings(context, "one_character" if settings.source == "OBJECTS" else "pose_count")
-        if settings.source == "FRAMES":
-            self.settings(context, "use_frame_range")
-            if settings.use_frame_range:
-                self.settings(context, "frame_first", "frame_last")
+        self.frame_range(context)
         self.segments(context)
         self.settings(context, "sides", "smoothness", "min_share")
         self.live(context)
@@ -110,8 +115,8 @@ class WKS_SEGMENT_PT_main(_Sidebar, bpy.types.Panel):
         column.scale_y = 1.4
         column.operator("wks_segment.learn", icon="MOD_EXPLODE")
         column.operator("wks_segment.apply", icon="BRUSHES_ALL")
-        self.job(context)
         self.layout.operator("wks_segment.clear", icon="X")
+        self.status(context)
 
 
 class SubPanel(_Sidebar):
@@ -128,8 +133,9 @@ class WKS_SEGMENT_PT_outputs(SubPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         settings = self.settings(context, "palette", "write_colors", "write_materials")
-        if settings.write_materials:
-            self.settings(context, "material_template")
+        template = self.layout.column()
+        template.active = settings.write_materials
+        template.prop(settings, "material_template")
         self.settings(context, "vertex_groups", "write_face_sets", "write_seams")
 
         column = self.layout.column(align=True)
@@ -146,7 +152,9 @@ class WKS_SEGMENT_PT_bake(SubPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         self.settings(context, "bake_size", "bake_margin", "bake_unwrap")
-        self.layout.operator("wks_segment.bake", icon="RENDER_STILL")
+        column = self.layout.column(align=True)
+        column.operator("wks_segment.bake", icon="RENDER_STILL")
+        column.operator("wks_segment.show_id_map", icon="IMAGE_DATA")
 
 
 class WKS_SEGMENT_PT_advanced(SubPanel, bpy.types.Panel):
@@ -171,17 +179,6 @@ class WKS_SEGMENT_PT_advanced(SubPanel, bpy.types.Panel):
         )
 
 
-def job_texts(job: BackgroundJob) -> tuple[str, str]:
-    """Stage and time left of a job in the user's language: "Signature of Fox · 3 of 5" and "about 20 s left".
-
-    The share that is done as long as the time left is unknown, and why the job ends once it was asked to.
-    """
-    if job.ending:
-        return in_panel("Canceling"), in_panel(job.reason)
-    stage = re.sub(r" \((\d+ \w+ \d+)\)$", r" · \1", in_panel(job.stage).replace('"', ""))
-    return stage, in_panel(job.time_left) or f"{100 * job.share:.0f} %"
-
-
 def wrapped(text: str) -> list[str]:
     """A text in the user's language, in lines that fit into the sidebar."""
     return wrapped_lines(in_panel(text))
@@ -189,7 +186,7 @@ def wrapped(text: str) -> list[str]:
 
 def wrapped_lines(shown: str) -> list[str]:
     """A translated text in lines that fit into the sidebar; a pair of numbers such as "3 of 5" stays in one line."""
-    pair = r"(?<=\d) (?=\d|(of|von) \d)|((?<=\d of)|(?<=\d von)) (?=\d)"
+    pair = r"(?<=·) (?=\d+ (of|von) \d)|(?<=\d) (?=\d|(of|von) \d)|((?<=\d of)|(?<=\d von)) (?=\d)"
     joined = re.sub(pair, "\N{NO-BREAK SPACE}", shown)
     return [short for line in joined.splitlines() for short in wrap(line, SIDEBAR_LETTERS)]
 

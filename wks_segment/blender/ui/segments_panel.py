@@ -7,7 +7,8 @@ from typing import Any
 import bpy
 
 from ...core.message import Message
-from .main_panel import SubPanel, wrapped
+from .color_icons import color_icons_of
+from .main_panel import SubPanel
 from .messages import in_panel
 from .translations import NAME
 
@@ -22,7 +23,6 @@ NAME_PRESETS = {
     ),
 }  # fmt: skip
 """Names to choose from, without the suffix of a side, which comes with the part."""
-NO_SEGMENTS = "No segments yet: learn a model, or apply one"
 
 
 class WKS_SEGMENT_UL_segments(bpy.types.UIList):
@@ -42,8 +42,9 @@ class WKS_SEGMENT_UL_segments(bpy.types.UIList):
         share = row.row(align=True)
         share.alignment = "RIGHT"
         share.label(text=f"{item.share:.1f} %")
+        hidden = item.hidden and context.mode != "OBJECT"  # where Blender shows hidden faces as well
         row.operator(
-            "wks_segment.hide_segment", text="", icon="HIDE_ON" if item.hidden else "HIDE_OFF", emboss=False
+            "wks_segment.hide_segment", text="", icon="HIDE_ON" if hidden else "HIDE_OFF", emboss=False
         ).part = item.number
 
 
@@ -57,7 +58,10 @@ class WKS_SEGMENT_MT_merge(bpy.types.Menu):
         settings = context.scene.wks_segment
         for index, item in enumerate(settings.segments):
             if index != settings.active_segment:
-                self.layout.operator("wks_segment.merge_segments", text=item.name, translate=False).into = item.number
+                self.layout.operator(
+                    "wks_segment.merge_segments", text=item.name, translate=False,
+                    icon_value=color_icons_of(context).icon(item.color),
+                ).into = item.number  # fmt: skip
 
 
 class WKS_SEGMENT_MT_names(bpy.types.Menu):
@@ -99,13 +103,6 @@ class WKS_SEGMENT_PT_segments(SubPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         settings, layout = context.scene.wks_segment, self.layout
-        if not settings.segments:
-            row = layout.row()
-            column = row.column()
-            for line in wrapped(NO_SEGMENTS):
-                column.label(text=line)
-            row.operator("wks_segment.refresh_segments", text="", icon="FILE_REFRESH", emboss=False)
-            return
         row = layout.row()
         row.template_list(
             WKS_SEGMENT_UL_segments.__name__, "", settings, "segments", settings, "active_segment", rows=5
@@ -113,7 +110,9 @@ class WKS_SEGMENT_PT_segments(SubPanel, bpy.types.Panel):
         column = row.column(align=True)
         column.operator("wks_segment.select_segment", text="", icon="RESTRICT_SELECT_OFF")
         column.operator("wks_segment.isolate_segment", text="", icon="ZOOM_SELECTED")
-        column.menu("WKS_SEGMENT_MT_names", text="", icon="SORTALPHA")
+        names = column.column(align=True)
+        names.enabled = len(settings.segments) > 0
+        names.menu("WKS_SEGMENT_MT_names", text="", icon="SORTALPHA")
         column.separator()
         column.menu("WKS_SEGMENT_MT_specials", text="", icon="DOWNARROW_HLT")
         row = layout.row(align=True)
@@ -122,11 +121,12 @@ class WKS_SEGMENT_PT_segments(SubPanel, bpy.types.Panel):
             row.operator("wks_segment.new_segment", text=in_panel("New"))
             row.operator("wks_segment.forget_faces", text=in_panel("Forget"))
         else:
-            row.menu("WKS_SEGMENT_MT_merge", text=in_panel("Merge Into"))
+            others = row.row(align=True)
+            others.enabled = len(settings.segments) > 1
+            others.menu("WKS_SEGMENT_MT_merge", text=in_panel("Merge Into"))
             row.operator("wks_segment.split_segment", text=in_panel("Split"))
-        if settings.faces_by_hand:
-            text = Message("{count} faces by hand", count=settings.faces_by_hand)
-            layout.label(text=in_panel(text), icon="HAND")
+        text = Message("{count} faces by hand", count=settings.faces_by_hand) if settings.faces_by_hand else ""
+        layout.label(text=in_panel(text), icon="HAND" if text else "NONE")
 
 
 CLASSES = (

@@ -8,9 +8,9 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from .background_job import redraw_sidebars
 from .followed_settings import follow_active
 from .old_files import upgrade_labels
+from .passing_message import redraw_sidebars
 
 ACTIVE_OBJECT = "wks_segment_active_object"
 """Name of the follower at the type of Blender's window manager."""

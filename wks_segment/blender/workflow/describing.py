@@ -72,7 +72,7 @@ class Prepared:
     def describing_share(self, model: PoseSegmentation, poses: Sequence[Pose], rest: Duration) -> float:
         """Share of the time of a job that is spent on signatures; see `PoseDescriber.describing_share`."""
         new = [poses[i].mesh for i, signature in self.known.items() if signature is None]
-        return model.describing_share(new, len(poses), rest)
+        return model.describing_share(new, len(self.known), rest)
 
 
 def prepare(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> Prepared:

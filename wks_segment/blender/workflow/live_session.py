@@ -12,7 +12,7 @@ from bpy.app.handlers import persistent
 
 from ...core import MemoryCache
 from ...core.mesh.triangle_mesh import IntArray
-from ...core.message import message_of
+from ...core.message import Message, message_of
 from ...core.progress import Progress
 from ..errors import ChangedError, UserError
 from ..outputs.origin import Origin, origin_of
@@ -22,8 +22,9 @@ from ..props.label_set import notes_of, style_of
 from ..props.preferences import preference
 from ..scene.characters import Character
 from . import model_library, segment_list
-from .background_job import job_holder, redraw_sidebars
+from .background_job import job_holder
 from .followed_settings import are_alike, show, values_of
+from .passing_message import PassingMessage, redraw_sidebars
 from .segmentation_job import SegmentationJob
 from .update_job import UpdateJob
 
@@ -68,8 +69,7 @@ class Session:
         self._cache = MemoryCache()
         self._kept: dict[str, SegmentationJob] = {}
         """Jobs by name, the one that was used last at the end."""
-        self.message = ""
-        """Why labels no longer follow, for the panel."""
+        self._message = PassingMessage()
         self.proposed: tuple[dict[str, Any], UpdateJob] | None = None
         """The shown but unwritten jobs with the values of their settings, until they are accepted or discarded."""
         self.preview = preview
@@ -88,11 +88,20 @@ class Session:
         """The kept job that was used last."""
         return next(reversed(self._kept.values()), None)
 
+    @property
+    def message(self) -> str:
+        """Why labels did not follow, for the panel."""
+        return self._message.text
+
+    def tell(self, message: str) -> None:
+        """Show in the panel why labels did not follow; an empty text takes that back."""
+        self._message.show(message)
+
     def write(self, job: SegmentationJob) -> None:
         """Write a computed job to its scene and keep it; ChangedError if the scene has changed."""
         job.write()
         self.withdraw()
-        self.message = ""
+        self.tell("")
         self._kept.pop(job.name, None)
         self._kept[job.name] = job
         while self._kept and sum(_bytes_of(each) for each in self._kept.values()) > MAX_KEPT_BYTES:
@@ -171,7 +180,11 @@ class Session:
         if rest > 0 or job_holder(context).job is not None:
             return max(rest, QUIET_SECONDS)
         scene = context.scene
-        if not self.holds(scene) or self.is_current(scene) or context.mode != "OBJECT":
+        if not self.holds(scene) or context.mode != "OBJECT":
+            return None
+        if self.is_current(scene):  # again, after a preview or a warning
+            self.withdraw()
+            self.tell("")
             return None
         window = next(iter(context.window_manager.windows), None)
         try:
@@ -182,10 +195,10 @@ class Session:
                 with context.temp_override(window=window):
                     bpy.ops.wks_segment.update("EXEC_DEFAULT", False)
         except UserError as error:
-            self.message = message_of(error)
+            self.tell(message_of(error))
         except RuntimeError as error:
             # The operator has reported in the user's language.
-            self.message = str(error).removeprefix("Error: ").strip()
+            self.tell(str(error).removeprefix("Error: ").strip())
         redraw_sidebars(context)
         return None
 
@@ -223,13 +236,20 @@ class Session:
         for job in update.jobs:
             with self._dropping(job.name):
                 self.write(job)
+        self._tell_warnings(update)
+
+    def _tell_warnings(self, update: UpdateJob) -> None:
+        """Show warnings in the panel: what a timer does is not in the status bar."""
+        warnings = dict.fromkeys(warning for job in update.jobs for warning in job.report.warnings)
+        self.tell(Message.joined(". ", warnings))
 
     def propose(self, context: bpy.types.Context) -> None:
         """Show in the viewport what an update would write."""
         update = self.updated(context)
         if self.proposed is None or update is not self.proposed[1]:
             update.compute(Progress())
-        self.proposed, self.message = (values_of(context.scene.wks_segment), update), ""
+        self.proposed = values_of(context.scene.wks_segment), update
+        self._tell_warnings(update)
         shown: dict[Character, IntArray] = {}
         styles: dict[Character, Style] = {}
         for job in update.jobs:
@@ -283,7 +303,7 @@ class Session:
     @persistent
     def _on_load(self, *_: Any) -> None:
         self.drop()
-        self.message = ""
+        self.tell("")
 
 
 def _bytes_of(job: SegmentationJob) -> int:

@@ -104,7 +104,7 @@ def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[Work
     n_faces = max(int(pose.polygon_of.max()) + 1 for pose in poses)
     if model.n_segments != "auto" and model.n_segments > n_faces:
         raise UserError(
-            '"{character}" has {faces} faces, too few for {segments} segments: take fewer segments, or subdivide it',
+            '"{character}" has too few faces ({faces}) for {segments} segments: take fewer segments, or subdivide it',
             character=poses[0].character.name,
             faces=n_faces,
             segments=model.n_segments,
@@ -167,7 +167,7 @@ def _parts_of(model: PoseSegmentation, views: MeshViews, request: LabelRequest, 
     """(p,) part of each polygon of a mesh."""
     two_sides = request.sides == "two"
     min_share = None if model.preset == "paper" else request.min_share
-    stage = Message('Labels of "{character}"', character=views.name)
+    stage = Message('Segments of "{character}"', character=views.name)
     step = progress.part(0.0, SEGMENT_SHARE if two_sides else 1.0, stage)
     step(0.0)
     parts = model.segment_polygons(

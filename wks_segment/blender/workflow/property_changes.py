@@ -37,7 +37,7 @@ class PropertyChanges:
             except UserError as error:
                 warnings = [message_of(error)]
             if warnings:
-                session.message = Message.joined(" ", dict.fromkeys(warnings))
+                session.tell(Message.joined(" ", dict.fromkeys(warnings)))
 
     def palette_chosen(self, settings: Any) -> None:
         """Give the selected objects, and those that share their labels, the colors of the palette."""

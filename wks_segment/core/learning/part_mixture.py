@@ -130,12 +130,13 @@ def learn_parts(
     alone = len(poses) == 1 or of_one_mesh([pose.pose for pose in poses])
     meshes = [poses] if alone else [[pose] for pose in poses]
     axes = _principal_axes(training)
-    kinds = _kinds_of(meshes, training.standardizer, axes, n_segments, rest, cache, progress.part(0.0, FOUND, "parts"))
+    step = progress.part(0.0, FOUND, "parts")
+    kinds, were_known = _kinds_of(meshes, training.standardizer, axes, n_segments, rest, cache, step)
     if covariance_type == "auto":
         covariance_type = "tied" if alone else "shared"
     usual = min(COMPONENTS_OF_MESH, COMPONENTS_OF_POSE * len(poses)) if alone else COMPONENTS_OF_BODIES
     count = max(usual, PER_SEGMENT * n_segments)
-    step = progress.part(FOUND, 1.0, "mixture")
+    step = progress.part(0.0 if were_known else FOUND, 1.0, "mixture")
     kind_of_samples = _kinds_of_samples(kinds.of_faces, meshes, training, kinds.count)
     found = after = np.bincount(kind_of_samples, training.shares, kinds.count).astype(np.float64)
     mixture, kind = _fitted_inside(training, kind_of_samples, axes, count, covariance_type)
@@ -175,8 +176,8 @@ def _kinds_of(
     rest: TriangleMesh | None,
     cache: Cache | None,
     progress: Progress,
-) -> Kinds:
-    """Kinds of parts of the meshes, each in some poses; from a cache if they are there."""
+) -> tuple[Kinds, bool]:
+    """Kinds of parts of the meshes, each in some poses, and whether they were in the cache."""
     key = ""
     if cache is not None:
         n_kinds = n_kinds_of_bodies(n_segments) if len(meshes) > 1 else None
@@ -186,7 +187,7 @@ def _kinds_of(
         key = content_key(description, at_rest, *(pose.pose.arrays() for of_mesh in meshes for pose in of_mesh))
         known = Kinds.of_arrays(cache.arrays(key) or {})
         if known is not None:
-            return known
+            return known, True
     evidence, projected = [], []
     for i, (of_mesh, step) in enumerate(progress.part(0.0, 0.5).each(meshes)):
         evidence.append(Evidence.of(of_mesh, rest if i == 0 else None, step, cache))
@@ -202,7 +203,7 @@ def _kinds_of(
             warnings.warn(
                 Message("parts were not kept for the next time: {reason}", reason=message_of(error)), stacklevel=3
             )
-    return kinds
+    return kinds, False
 
 
 def _kinds_of_samples(

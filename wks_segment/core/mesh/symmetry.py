@@ -34,13 +34,13 @@ def upright_axes(mesh: TriangleMesh, axes: FloatArray, left: Sequence[FloatArray
     ----------
     mesh : TriangleMesh
     axes : (3, 3) array
-        The axes of its rig as columns. The first one says which side is left, and is the normal unless the body is
-        clearly more symmetric in another plane.
+        The axes of its rig as columns. The first one is the normal unless the body is clearly more symmetric in another
+        plane, and says which side is left if nothing else does.
     left : optional
-        Other directions to the left, for a rig whose first axis lies in the mirror plane.
+        Directions to the left that are known better.
     """
     normal = mirror_normal(mesh, axes[:, 0], np.vstack([axes[:, 1:].T, np.eye(3)]))
-    for direction in (axes[:, 0], *left, axes[:, 1], axes[:, 2]):
+    for direction in (*left, axes[:, 0], axes[:, 1], axes[:, 2]):
         cosine = float(direction @ normal) / (float(np.linalg.norm(direction)) or 1.0)
         if abs(cosine) >= ALONG:
             normal = normal * np.sign(cosine)
