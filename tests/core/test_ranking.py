@@ -1,6 +1,8 @@
 """Rankings of models: comparable between settings, with a verdict."""
 
 import json
+from copy import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -63,6 +65,22 @@ def test_models_with_different_settings_are_comparable(models, other):
 
 def test_shape_of_no_class_fits_no_model(models):
     assert ranked(models, icosphere(3)).verdict == "nothing fits"
+
+
+@pytest.mark.parametrize("factors", [(1, 1, 1.1), (1.1, 1, 1), (1, 1.15, 1)])
+def test_body_of_other_proportions_fits(models, factors):
+    body = creature(0.45, 3)
+    found = ranked(models, TriangleMesh(body.vertices * factors, body.faces))
+    assert (found.best.index, found.verdict) == (0, "sure")
+    assert not found.ranks[1].fits
+
+
+def test_correlations_do_not_count_for_models_of_one_mesh(models):
+    model, pose = copy(models[0]), models[0].describe(creature(0.45, 3))
+    assert model.mixture_.covariance_type == "tied"
+    model.mixture_ = replace(model.mixture_, covariances=np.diag(np.diag(model.mixture_.covariances)))
+    assert model.comparable_score(pose) == pytest.approx(models[0].comparable_score(pose))
+    assert model.score(pose) != pytest.approx(models[0].score(pose), rel=0.01)
 
 
 def test_verdict_is_unsure_between_equal_models(models):
