@@ -17,10 +17,10 @@ def certainties(model: PoseSegmentation) -> dict[int, float] | None:
 
 def certainty_lines(model: PoseSegmentation) -> list[str]:
     """A line that says how certain each number of segments is, if the number was automatic; else none."""
-    shares = certainties(model)
-    if model.n_segments != "auto" or not shares:
+    if model.n_segments != "auto" or model.grouping_ is None:
         return []
-    curve = " · ".join(f"{number} {share:.2f}" for number, share in shares.items())
+    shares = enumerate(model.grouping_.curve()[1:MOST_SEGMENTS], start=2)
+    curve = " · ".join(f"{number} {share:.2f}" for number, share in shares)
     return [Message("Certainty by segments: {curve} ({number} taken)", curve=curve, number=model.n_segments_)]
 
 
