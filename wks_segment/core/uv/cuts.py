@@ -146,9 +146,8 @@ class _Opening:
         on_rim = np.unique(charts.rim)
         self.loop = np.full(charts.n_nodes, -1)
         """(n,) boundary loop of each node."""
-        self.loop[on_rim] = np.unique(connected_groups(charts.rim, charts.n_nodes)[on_rim], return_inverse=True)[
-            1
-        ].ravel()
+        group = connected_groups(charts.rim, charts.n_nodes)[on_rim]
+        self.loop[on_rim] = np.unique(group, return_inverse=True)[1].ravel()
         self.n_loops = int(self.loop.max(initial=-1)) + 1
         self.needs_handles = charts.handles > 0
         self.hole = self._flat_holes()
