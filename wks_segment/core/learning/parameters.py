@@ -50,7 +50,9 @@ class Estimator:
         """Set parameters, which are checked by `fit`; ValueError if there is none of a name."""
         for name, value in parameters.items():
             if name not in PARAMETERS:
-                raise ValueError(f"Invalid parameter {name!r}: there are {', '.join(PARAMETERS)}")
+                raise ValueError(
+                    Message("there is no parameter {name!r}, only {known}", name=name, known=", ".join(PARAMETERS))
+                )
             setattr(self, name, value)
         return self
 

@@ -278,6 +278,8 @@ GERMAN_MESSAGES = {
     "n_pairs must be at least 1, not {value!r}": "n_pairs muss mindestens 1 sein, nicht {value!r}",
     "values must have the shape (k,) and functions (n, k), not {values} and {functions}": "values müssen die Form (k,) und functions die Form (n, k) haben, nicht {values} und {functions}",
     "the coarse space has entries that are not finite": "der grobe Raum hat Einträge, die nicht endlich sind",
+    "rounding hides eigenvalues in the coarse space": "Rundung verdeckt Eigenwerte im groben Raum",
+    "there is no parameter {name!r}, only {known}": "es gibt keinen Parameter {name!r}, nur {known}",
     # Outputs.
     '"{name}" has no segments: use Learn and Segment, or Apply to Selected, first': '"{name}" hat keine Segmente: erst Lernen und segmentieren oder Auf Auswahl anwenden benutzen',
     '"{name}" has no UV map with faces in it: unwrap it (Unwrap Segments), or let the bake do it (Unwrap if Needed, --unwrap)': '"{name}" hat keine UV-Map mit Flächen darin: es abwickeln (Segmente abwickeln) oder beim Backen abwickeln lassen (Bei Bedarf abwickeln, --unwrap)',
