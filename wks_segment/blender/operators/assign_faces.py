@@ -81,7 +81,7 @@ class WKS_SEGMENT_OT_forget_faces(BaseOperator, bpy.types.Operator):
                 count += int(forgotten.sum())
                 keep_by_hand(mesh, np.where(forgotten, -1, parts))
             warnings = segment_list.rewrite_all(settings, segment_list.active_labels(settings), objects)
-        _report.tell(self, {"INFO"}, Message("{count} faces have the segment of the model again", count=count))
+        _report.tell(self, {"INFO"}, Message("{count:,} faces have the segment of the model again", count=count))
         _report.tell_warnings(self, warnings)
         return {"FINISHED"}
 
@@ -106,6 +106,6 @@ def _assign(operator: bpy.types.Operator, context: bpy.types.Context, part: int 
         _report.tell(operator, {"WARNING"}, "Select some faces of an object that has segments first")
         return {"CANCELLED"}
     segment = settings.style(labels).name_of(part)
-    _report.tell(operator, {"INFO"}, Message("Assigned {count} faces to {segment}", count=count, segment=segment))
+    _report.tell(operator, {"INFO"}, Message("Assigned {count:,} faces to {segment}", count=count, segment=segment))
     _report.tell_warnings(operator, warnings)
     return {"FINISHED"}

@@ -75,7 +75,7 @@ def _losses(selected: list[bpy.types.Object]) -> list[Message]:
     losses = []
     count = sum(faces_by_hand(mesh) for mesh in {obj.data for obj in selected})
     if count:
-        losses.append(Message("{count} faces that were assigned by hand are cleared as well", count=count))
+        losses.append(Message("{count:,} faces that were assigned by hand are cleared as well", count=count))
     originals = [original for obj in selected if (original := original_of(obj)) is not None]
     for original in dict.fromkeys(originals):
         separated = separated_from(original)

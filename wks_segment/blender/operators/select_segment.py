@@ -51,7 +51,7 @@ class WKS_SEGMENT_OT_select_segment(BaseOperator, bpy.types.Operator):
             bpy.ops.mesh.select_all(action="DESELECT")
         count = sum(_select(mesh, part) for mesh in segment_list.meshes_of(objects))
         segment = settings.style(segment_list.active_labels(settings)).name_of(part)
-        _report.tell(self, {"INFO"}, Message("Selected {count} faces of {segment}", count=count, segment=segment))
+        _report.tell(self, {"INFO"}, Message("Selected {count:,} faces of {segment}", count=count, segment=segment))
         return {"FINISHED"}
 
 

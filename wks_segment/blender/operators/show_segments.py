@@ -47,7 +47,7 @@ class _HidesFaces(BaseOperator):
                     _hide(mesh, hidden)
                     count += int(hidden.sum())
             segment_list.fill(settings)
-        message = Message("{count} faces are hidden", count=count) if count else "No faces are hidden"
+        message = Message("{count:,} faces are hidden", count=count) if count else "No faces are hidden"
         _report.tell(self, {"INFO"}, message)
         return {"FINISHED"}
 

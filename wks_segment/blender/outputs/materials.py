@@ -73,7 +73,7 @@ def _warn_of_left(mesh: bpy.types.Mesh, slots: TakenBackSlots, ledger: Ledger) -
         used = np.unique(read_ints(mesh.polygons, "material_index")[slots.left]).tolist()
         ledger.warnings.append(
             Message(
-                '{count} faces of "{mesh}" keep {materials}: which material they had before is not known',
+                '{count:,} faces of "{mesh}" keep {materials}: which material they had before is not known',
                 count=int(slots.left.sum()),
                 mesh=mesh.name,
                 materials=quoted(mesh.materials[i].name for i in used),

@@ -125,8 +125,8 @@ class WKS_SEGMENT_PT_segments(SubPanel, bpy.types.Panel):
             others.enabled = len(settings.segments) > 1
             others.menu("WKS_SEGMENT_MT_merge", text=in_panel("Merge Into"))
             row.operator("wks_segment.split_segment", text=in_panel("Split"))
-        text = Message("{count} faces by hand", count=settings.faces_by_hand) if settings.faces_by_hand else ""
-        layout.label(text=in_panel(text), icon="HAND" if text else "NONE")
+        text = Message("{count:,} faces by hand", count=settings.faces_by_hand) if settings.faces_by_hand else ""
+        layout.label(text=in_panel(text), icon="VIEW_PAN" if text else "NONE")
 
 
 CLASSES = (

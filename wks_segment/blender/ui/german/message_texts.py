@@ -28,12 +28,12 @@ GERMAN_MESSAGES = {
     "Separated into {count} objects": "In {count} Objekte getrennt",
     "Baked {images}: {size} × {size} pixels, kept in this file": "{images} gebacken: {size} × {size} Pixel, in dieser Datei behalten",
     "{count} segments taken over": "{count} Segmente übernommen",
-    "Selected {count} faces of {segment}": "{count} Flächen von {segment} ausgewählt",
-    "{count} faces are hidden": "{count} Flächen sind verborgen",
+    "Selected {count:,} faces of {segment}": "{count:,} Flächen von {segment} ausgewählt",
+    "{count:,} faces are hidden": "{count:,} Flächen sind verborgen",
     "No faces are hidden": "Keine Flächen sind verborgen",
-    "Assigned {count} faces to {segment}": "{count} Flächen {segment} zugewiesen",
-    "{count} faces have the segment of the model again": "{count} Flächen haben wieder das Segment des Modells",
-    "{count} faces by hand": "{count} Flächen von Hand",
+    "Assigned {count:,} faces to {segment}": "{count:,} Flächen {segment} zugewiesen",
+    "{count:,} faces have the segment of the model again": "{count:,} Flächen haben wieder das Segment des Modells",
+    "{count:,} faces by hand": "{count:,} Flächen von Hand",
     "Named {segment}": "Benannt: {segment}",
     "Merged {segment} into {other}": "{segment} mit {other} vereint",
     "Split {segment} into {count} parts": "{segment} in {count} Teile zerlegt",
@@ -91,7 +91,7 @@ GERMAN_MESSAGES = {
     "Nothing is selected that has segments of a model: use Learn and Segment or Apply to Selected": "Nichts ist ausgewählt, das Segmente eines Modells hat: „Lernen und segmentieren“ oder „Auf Auswahl anwenden“ drücken",
     "What Live needs was not kept: press Update Segments once, and it follows again": "Was Live braucht, wurde nicht aufbewahrt: einmal „Segmente aktualisieren“ drücken, dann folgt es wieder",
     "the colors of the palette are not numbers by segment": "die Farben der Palette sind keine Zahlen je Segment",
-    "{count} faces that were assigned by hand are cleared as well": "{count} von Hand zugewiesene Flächen werden mit geleert",
+    "{count:,} faces that were assigned by hand are cleared as well": "{count:,} von Hand zugewiesene Flächen werden mit geleert",
     'All {count} objects that were separated from "{object}" are removed, and it is shown again': 'Alle {count} Objekte, die von "{object}" getrennt wurden, werden entfernt, und es ist wieder zu sehen',
     '{count} objects that were separated from "{object}" are removed, and it is shown again; those that you have changed stay: {names}': '{count} Objekte, die von "{object}" getrennt wurden, werden entfernt, und es ist wieder zu sehen; geänderte bleiben: {names}',
     "{names}: the transferred segments stay, Clear removes them": "{names}: die übertragenen Segmente bleiben, Leeren entfernt sie",
@@ -170,8 +170,8 @@ GERMAN_MESSAGES = {
         'Das Mesh von "{name}" ist ein Library Override, von dem Blender die Segmente nicht speichern würde: es erst '
         "lokal machen (Objekt > Beziehungen > Lokal machen)"
     ),
-    '{count} faces of "{mesh}" keep {materials}: which material they had before is not known': (
-        '{count} Flächen von "{mesh}" behalten {materials}: welches Material sie vorher hatten, ist nicht bekannt'
+    '{count:,} faces of "{mesh}" keep {materials}: which material they had before is not known': (
+        '{count:,} Flächen von "{mesh}" behalten {materials}: welches Material sie vorher hatten, ist nicht bekannt'
     ),
     'The image "{name}" has been changed since it was baked, and stays': (
         'Das Bild "{name}" wurde seit dem Backen geändert und bleibt'
