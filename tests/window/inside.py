@@ -67,6 +67,9 @@ def button(name, kind="UI"):
             yield
             here = _hovered(kind)
             if here == name:
+                yield from settle()  # while a job runs, Blender lags behind the mouse: it may still be where it was
+                here = _hovered(kind)
+            if here == name:
                 return [x, y + PROBE_STEP // 3]
             found[here] = [x, y]
             last = max((place[1] for key, place in found.items() if key), default=top + 400)
