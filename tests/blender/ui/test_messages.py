@@ -54,6 +54,10 @@ def test_all_messages_of_the_code_have_a_german_text():
     assert {text: TEMPLATES[text] for text in TEMPLATES if speaks(text) and text not in KNOWN} == {}
 
 
+def test_counts_of_faces_have_separators():
+    assert [text for text in TEMPLATES if re.search(r"\{(?!face\b)\w+\} faces", text)] == []
+
+
 def test_messages_are_found():
     assert len(TEMPLATES) > 200
     # By a constant of another module, an attribute, a function that returns it, a choice, a table.

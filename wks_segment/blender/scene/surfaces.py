@@ -142,7 +142,7 @@ def _origin_of_faces(obj: bpy.types.Object, mesh: bpy.types.Mesh, origins: Origi
             pose=pose, object=obj.name,
         )  # fmt: skip
     raise OtherFacesError(
-        '"{pose}": "{object}" has {there} faces there that are not those of its mesh, which has {here}: a cache '
+        '"{pose}": "{object}" has {there:,} faces there that are not those of its mesh, which has {here:,}: a cache '
         "changes its faces from frame to frame. Take frames in which they stay the same",
         pose=pose, object=obj.name, there=len(mesh.polygons), here=len(obj.data.polygons),
     )  # fmt: skip
