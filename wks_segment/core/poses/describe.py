@@ -6,7 +6,7 @@ import os
 import threading
 import warnings
 from collections.abc import Iterable, Sequence
-from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from functools import partial
 from typing import Literal, NamedTuple
 
@@ -24,6 +24,7 @@ from ..threads import one_blas_thread
 from .arguments import as_list
 from .pose_cache import AnyPose, Workpiece
 from .pose_signature import PoseSignature
+from .signals import signals_held
 from .signature_cache import SignatureCache, signature_key
 
 VERTICES_PER_PAIR = 15
@@ -215,11 +216,13 @@ class PoseDescriber:
             finally:
                 shared.finish(i)
 
-        with ThreadPoolExecutor(workers or self._workers(meshes)) as pool:
-            futures = {i: pool.submit(describe_one, i) for i in new}
+        futures: dict[int, Future[PoseSignature]] = {}
+        with signals_held() as let_signals_in, ThreadPoolExecutor(workers or self._workers(meshes)) as pool:
             try:
+                futures |= {i: pool.submit(describe_one, i) for i in new}
                 waiting = set(futures.values())
                 while waiting:
+                    let_signals_in()
                     shared.report()
                     finished, waiting = wait(waiting, PROGRESS_SECONDS, FIRST_COMPLETED)
                     for future in finished:
