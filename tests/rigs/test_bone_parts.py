@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from wks_segment.rigs import STANDARD, BoneTree, Skeleton, Skin, parts_of_faces, rows_by_names, rows_by_number
+from wks_segment.rigs import (
+    STANDARD,
+    BoneTree,
+    Skeleton,
+    Skin,
+    parts_of_faces,
+    rows_by_names,
+    rows_by_number,
+    usual_rows,
+)
 
 HUMAN = {
     "root": None, "hips": "root", "spine": "hips", "chest": "spine", "neck": "chest", "head": "neck", "jaw": "head",
@@ -47,7 +56,7 @@ def tree_of(parent_of, area_of, touching=()):
 
 
 def parts(tree, number, sides=True):
-    found = parts_of_faces([tree], [rows_by_number(tree, number)], sides)
+    found = parts_of_faces([tree], [rows_by_number(tree.rows, number)], sides)
     return [part.full_name for part in found.parts]
 
 
@@ -75,7 +84,7 @@ def test_bones_of_the_spine_become_the_torso():
 @pytest.mark.parametrize("number", [1, 2, 5, 9, 13, 40])
 def test_numbers_have_no_gap_and_count_pairs_once(number):
     tree = tree_of(HUMAN, AREAS)
-    own = rows_by_number(tree, number)
+    own = rows_by_number(tree.rows, number)
     assert len(own) == min(number, len(tree.rows))
     found = parts_of_faces([tree], [own])
     assert np.unique(found.labels[0]).tolist() == list(range(len(found.parts)))
@@ -86,7 +95,8 @@ def test_numbers_have_no_gap_and_count_pairs_once(number):
 
 def test_parts_with_standard_names():
     tree = tree_of(HUMAN, AREAS)
-    found = parts_of_faces([tree], [rows_by_names(tree, STANDARD)], names=STANDARD)
+    own, names = usual_rows(tree.rows)
+    found = parts_of_faces([tree], [own], names=[names])
     assert {part.name for part in found.parts} == {
         "Torso", "Hips", "Neck", "Head", "Upper Arm", "Forearm", "Hand", "Thigh", "Shin", "Foot",
     }  # fmt: skip
@@ -95,7 +105,7 @@ def test_parts_with_standard_names():
 def test_two_rigs_share_their_parts():
     other = {"mixamorig:Hips": None, "mixamorig:Head": "mixamorig:Hips", "Tail1": "mixamorig:Hips"}
     trees = [tree_of(HUMAN, AREAS), tree_of(other, {"mixamorig:Hips": 5, "mixamorig:Head": 3, "Tail1": 2})]
-    found = parts_of_faces(trees, [rows_by_names(tree, STANDARD) for tree in trees], names=STANDARD)
+    found = parts_of_faces(trees, [rows_by_names(tree.rows, STANDARD) for tree in trees], names=[STANDARD] * 2)
     names = [part.full_name for part in found.parts]
     assert names[-1] == "Tail"
     assert {names[i] for i in np.unique(found.labels[1])} == {"Hips", "Head", "Tail"}
@@ -118,7 +128,7 @@ def test_a_foot_that_touches_nothing_belongs_to_the_shin():
 def test_numbered_bones_of_no_known_name():
     rig = {f"Bone.{i:03}": None if i == 0 else f"Bone.{i - 1:03}" for i in range(300)}
     tree = tree_of(rig, dict.fromkeys(rig, 1))
-    found = parts_of_faces([tree], [rows_by_number(tree, 8)])
+    found = parts_of_faces([tree], [rows_by_number(tree.rows, 8)])
     assert len(found.parts) == 8
     assert len({part.full_name for part in found.parts}) == 8
     assert all(part.name.startswith("Bone ") for part in found.parts)
@@ -130,7 +140,7 @@ def test_faces_without_weights_have_no_part():
     skin = skin_of(skeleton, [4, 4])
     skin.weights[6:12] = 0
     tree = BoneTree.of(skeleton, skin)
-    labels = parts_of_faces([tree], [rows_by_number(tree, 2)]).labels[0]
+    labels = parts_of_faces([tree], [rows_by_number(tree.rows, 2)]).labels[0]
     assert labels.tolist() == [0, 0, -1, -1, 1, 1, 1, 1]
 
 

@@ -4,7 +4,7 @@ Needs no Blender: bones come as names and parents, and the skin as arrays.
 """
 
 from .bone_names import BoneName, plain_names, read_name
-from .bone_parts import BonePart, PartsOfFaces, parts_of_faces, rows_by_names, rows_by_number
+from .bone_parts import BonePart, PartsOfFaces, parts_of_faces, rows_by_names, rows_by_number, usual_rows
 from .bone_tree import BoneRow, BoneTree
 from .dictionary import STANDARD
 from .skeleton import Skeleton
@@ -24,4 +24,5 @@ __all__ = [
     "read_name",
     "rows_by_names",
     "rows_by_number",
+    "usual_rows",
 ]

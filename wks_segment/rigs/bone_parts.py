@@ -9,8 +9,8 @@ import numpy as np
 
 from ..core.mesh.triangle_mesh import IntArray
 from .bone_names import LEFT_SIDE, NO_SIDE, RIGHT_SIDE
-from .bone_tree import TINY_BONE, BoneTree
-from .dictionary import BROADER, DETAILS, MIDLINE, broader_names
+from .bone_tree import TINY_BONE, BoneRow, BoneTree
+from .dictionary import BROADER, DETAILS, MIDLINE, STANDARD, broader_names
 
 SAME_NAME, DETAIL, SAME_REGION = 0.005, 0.1, 0.25
 """Factors of the area of a row that joins its parent: with the same name (a tail, a twist of a limb), as a detail
@@ -18,6 +18,9 @@ SAME_NAME, DETAIL, SAME_REGION = 0.005, 0.1, 0.25
 parts of 21 rigs with 10 and with 12 parts."""
 TELLING = 0.15
 """Share of a part's area below which a bone has no say in the part's name: a shoulder does not make an arm a torso."""
+USUAL_NUMBER, MOSTLY_NAMED = 12, 0.5
+"""Number of parts of a rig whose names say little, about as many as the standard parts of a person, and the share of
+the area with known names above which names decide."""
 SUFFIX_OF_SIDE = {NO_SIDE: "", LEFT_SIDE: ".L", RIGHT_SIDE: ".R"}
 
 
@@ -58,12 +61,11 @@ class PartsOfFaces:
     labels: list[IntArray]
 
 
-def rows_by_number(tree: BoneTree, number: int) -> frozenset[int]:
+def rows_by_number(rows: Sequence[BoneRow], number: int) -> frozenset[int]:
     """The rows that are parts so that there are so many, both sides of a pair counted once; fewer if the rig has fewer.
 
     Tiny rows are never parts.
     """
-    rows = tree.rows
     own = set(range(len(rows)))
     area, above = [row.area for row in rows], [row.parent for row in rows]
     while len(own) > 1:
@@ -77,23 +79,39 @@ def rows_by_number(tree: BoneTree, number: int) -> frozenset[int]:
     return frozenset(own)
 
 
-def rows_by_names(tree: BoneTree, names: Collection[str]) -> frozenset[int]:
+def rows_by_names(rows: Sequence[BoneRow], names: Collection[str]) -> frozenset[int]:
     """The rows that are parts so that the parts have some names, of those that the rig has."""
-    own = set()
-    for row in range(len(tree.rows)):
-        wanted = _wanted(tree.rows[row].name, names)
-        parent = tree.rows[row].parent
-        if parent < 0 or (wanted is not None and wanted != _wanted_above(tree, parent, names)):
-            own.add(row)
-    for row in sorted(own, reverse=True):
-        members = _owners(tree, own) == row
-        if tree.rows[row].parent >= 0 and sum(tree.rows[each].area for each in np.flatnonzero(members)) < TINY_BONE:
-            own.remove(row)
+    own: set[int] = set()
+    inherited: list[str | None] = []
+    for i, row in enumerate(rows):
+        above = None if row.parent < 0 else inherited[row.parent]
+        wanted = _wanted(row.name, names)
+        if row.parent < 0 or (wanted is not None and wanted != above):
+            own.add(i)
+        inherited.append(wanted or above)
+    for i in sorted(own, reverse=True):
+        members = np.flatnonzero(_owners(rows, own) == i)
+        if rows[i].parent >= 0 and sum(rows[each].area for each in members) < TINY_BONE:
+            own.remove(i)
     return frozenset(own)
 
 
+def usual_rows(rows: Sequence[BoneRow]) -> tuple[frozenset[int], Collection[str]]:
+    """The rows that are parts if nobody asks for a number, and the names that their parts get.
+
+    They are the standard parts of people and animals, or `USUAL_NUMBER` parts of a rig with other names.
+    """
+    own = rows_by_names(rows, STANDARD)
+    if len(own) > 2 and sum(row.area for row in rows if row.known) >= MOSTLY_NAMED:
+        return own, STANDARD
+    return rows_by_number(rows, USUAL_NUMBER), ()
+
+
 def parts_of_faces(
-    trees: Sequence[BoneTree], own: Sequence[Collection[int]], sides: bool = True, names: Collection[str] = ()
+    trees: Sequence[BoneTree],
+    own: Sequence[Collection[int]],
+    sides: bool = True,
+    names: Sequence[Collection[str]] = (),
 ) -> PartsOfFaces:
     """Parts of several meshes, given the rows of each tree that are parts; parts with the same name are one.
 
@@ -104,13 +122,13 @@ def parts_of_faces(
     sides : bool
         Whether left and right are two parts where the rig has bones on both sides.
     names
-        Names that parts get where they fit, whatever bones they are of: those of `rows_by_names`.
+        For each tree, names that parts get where they fit, whatever bones they are of: those of `rows_by_names`.
     """
     numbers: dict[BonePart, int] = {}
     labels = []
-    for tree, chosen in zip(trees, own, strict=True):
-        owner = _owners(tree, chosen)
-        name_of = _names(tree, owner, names)
+    for tree, chosen, wanted in zip(trees, own, names or [()] * len(trees), strict=True):
+        owner = _owners(tree.rows, chosen)
+        name_of = _names(tree.rows, owner, wanted)
         of_faces = np.full(len(tree.areas), -1)
         moved = tree.row_of_faces >= 0
         part_row = np.where(moved, owner[tree.row_of_faces], -1)
@@ -135,10 +153,10 @@ def _cost(name: str, into: str, area: float) -> float:
     return area
 
 
-def _owners(tree: BoneTree, own: Collection[int]) -> IntArray:
+def _owners(rows: Sequence[BoneRow], own: Collection[int]) -> IntArray:
     """(rows,) the row that each row is a part of: itself, or the next one above that is a part, or the first row."""
     owners: list[int] = []
-    for i, row in enumerate(tree.rows):
+    for i, row in enumerate(rows):
         owners.append(i if i in own or row.parent < 0 else owners[row.parent])
     return np.array(owners)
 
@@ -153,17 +171,17 @@ def _sides(tree: BoneTree, part_row: IntArray, name_of: dict[int, str]) -> IntAr
     return sides
 
 
-def _names(tree: BoneTree, owner: IntArray, names: Collection[str]) -> dict[int, str]:
+def _names(rows: Sequence[BoneRow], owner: IntArray, names: Collection[str]) -> dict[int, str]:
     """A name for each row that is a part, all different among rows of one rig that do not have one of `names`."""
     found: dict[int, str] = {}
     taken: set[str] = set()
     for part in np.unique(owner).tolist():
         members = np.flatnonzero(owner == part).tolist()
-        wanted = _wanted(_name_of(tree, members), names)
+        wanted = _wanted(_name_of(rows, members), names)
         if wanted is not None:
             found[part] = wanted
             continue
-        base = name = _name_of(tree, members)
+        base = name = _name_of(rows, members)
         count = 1
         while name in taken:
             count += 1
@@ -173,11 +191,11 @@ def _names(tree: BoneTree, owner: IntArray, names: Collection[str]) -> dict[int,
     return found
 
 
-def _name_of(tree: BoneTree, members: Sequence[int]) -> str:
+def _name_of(rows: Sequence[BoneRow], members: Sequence[int]) -> str:
     """Name of a part of some rows: the smallest that stands for all large ones of them, else that of the largest."""
     by_name: dict[str, float] = {}
     for row in members:
-        by_name[tree.rows[row].name] = by_name.get(tree.rows[row].name, 0.0) + tree.rows[row].area
+        by_name[rows[row].name] = by_name.get(rows[row].name, 0.0) + rows[row].area
     total = sum(by_name.values())
     largest = max(by_name, key=by_name.__getitem__)
     telling = [name for name, area in by_name.items() if area >= TELLING * total]
@@ -190,8 +208,3 @@ def _name_of(tree: BoneTree, members: Sequence[int]) -> str:
 def _wanted(name: str, names: Collection[str]) -> str | None:
     """The one of some names that a plain name belongs to."""
     return next((each for each in broader_names(name) if each in names), None)
-
-
-def _wanted_above(tree: BoneTree, row: int, names: Collection[str]) -> str | None:
-    """The wanted name of a row, or of the next one above that has one."""
-    return next((wanted for each in tree.path(row) if (wanted := _wanted(tree.rows[each].name, names))), None)
