@@ -2,7 +2,7 @@
 
 import pytest
 
-from wks_segment.rigs import Skeleton, read_name
+from wks_segment.rigs import Skeleton, read_name, split_side
 
 SIDES = {0: "", 1: ".L", 2: ".R"}
 
@@ -141,3 +141,20 @@ def test_pairs_that_are_numbered_in_opposite_order():
     skeleton = Skeleton.of({"arm_L_2": None, "arm_L_1": "arm_L_2", "arm_R_1": None, "arm_R_2": "arm_R_1"})
     found = {skeleton.bones[left]: skeleton.bones[right] for left, right in skeleton.mirrored().items()}
     assert found == {"arm_L_2": "arm_R_1", "arm_L_1": "arm_R_2"}
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "side"),
+    [
+        ("upper_arm.L", "upper_arm", 1),
+        ("Left Arm", "Arm", 1),
+        ("RightHand", "Hand", 2),
+        ("arm_r_cloth", "arm_cloth", 2),
+        ("Wool sweater", "Wool sweater", 0),
+        ("Leather", "Leather", 0),
+        ("R", "R", 0),
+        ("Glove.R.001", "Glove.001", 2),
+    ],
+)
+def test_names_of_the_artist_keep_their_form(name, text, side):
+    assert split_side(name) == (text, side)

@@ -33,15 +33,17 @@ from .operators.show_segments import (
     WKS_SEGMENT_OT_show_segments,
 )
 from .operators.split_segment import WKS_SEGMENT_OT_split_segment
+from .operators.teach import WKS_SEGMENT_OT_list_bones, WKS_SEGMENT_OT_teach
 from .operators.transfer import WKS_SEGMENT_OT_transfer
 from .operators.unwrap import WKS_SEGMENT_OT_unwrap
 from .operators.update import WKS_SEGMENT_OT_update
 from .props import changes, preferences, presets
+from .props.bone_item import WKSBoneItem
 from .props.label_set import WKSLabelSet
 from .props.model_item import WKSModelItem, WKSRankItem
 from .props.segment_item import WKSSegmentItem
 from .props.settings import WKSSegmentSettings
-from .ui import main_panel, menu, models_panel, segments_panel
+from .ui import main_panel, menu, models_panel, segments_panel, teach_panel
 from .ui.color_icons import COLOR_ICONS, ColorIcons
 from .ui.preview import ViewportPreview
 from .ui.translations import TRANSLATIONS
@@ -53,6 +55,8 @@ from .workflow.property_changes import PropertyChanges
 
 OPERATORS = (
     WKS_SEGMENT_OT_learn,
+    WKS_SEGMENT_OT_teach,
+    WKS_SEGMENT_OT_list_bones,
     WKS_SEGMENT_OT_apply,
     WKS_SEGMENT_OT_cancel,
     WKS_SEGMENT_OT_update,
@@ -91,6 +95,7 @@ CLASSES = (
     WKSModelItem,
     WKSLabelSet,
     WKSRankItem,
+    WKSBoneItem,
     WKSSegmentSettings,
     *OPERATORS,
     *menu.CLASSES,
@@ -98,6 +103,7 @@ CLASSES = (
     # Blender shows sub-panels in the order of their registration.
     main_panel.CLASSES[0],
     *segments_panel.CLASSES,
+    *teach_panel.CLASSES,
     *models_panel.CLASSES,
     *main_panel.CLASSES[1:],
 )

@@ -3,7 +3,7 @@
 Needs no Blender: bones come as names and parents, and the skin as arrays.
 """
 
-from .bone_names import BoneName, plain_names, read_name
+from .bone_names import BoneName, plain_names, read_name, split_side
 from .bone_parts import BonePart, PartsOfFaces, parts_of_faces, rows_by_names, rows_by_number, usual_rows
 from .bone_tree import BoneRow, BoneTree
 from .dictionary import STANDARD
@@ -24,5 +24,6 @@ __all__ = [
     "read_name",
     "rows_by_names",
     "rows_by_number",
+    "split_side",
     "usual_rows",
 ]

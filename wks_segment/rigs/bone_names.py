@@ -52,6 +52,18 @@ def read_name(bone: str) -> BoneName:
     return BoneName(known, side, True, tuple(lowered))
 
 
+def split_side(name: str) -> tuple[str, int]:
+    """A name as it is written, without its side, and the side; "arm.L" and "Left arm" are the arm on the left."""
+    words = list(WORD_IN_NAME.finditer(name))
+    found = [word for word in words if word[0].lower() in SIDE_WORDS]
+    if not found or not any(word not in found and not word[0].isdecimal() for word in words):
+        return name, NO_SIDE
+    at = next((word for word in found if len(word[0]) > 1), found[-1])
+    before, after = name[: at.start()], name[at.end() :]
+    text = before.rstrip(" ._-") + after if not after or not after[0].isalpha() else before + after.lstrip(" ._-")
+    return text.strip(" ._-"), SIDE_WORDS[at[0].lower()]
+
+
 def plain_names(bones: Sequence[str], parents: Sequence[int]) -> list[BoneName]:
     """Names of the bones of a rig; a bone named as a whole limb is its upper or lower part if the limb has several.
 

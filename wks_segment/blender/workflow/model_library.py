@@ -84,7 +84,7 @@ def text_of(settings: WKSSegmentSettings, uid: str) -> str:
 
 def learned(
     settings: WKSSegmentSettings, model: PoseSegmentation, summary: Sequence[str], names: Sequence[str],
-    character: str,
+    character: str, keeps_names: bool = False,
 ) -> str:  # fmt: skip
     """Keep a learned model and use it; return the key of its label set.
 
@@ -100,12 +100,14 @@ def learned(
         Names of the objects that it was learned from.
     character : str
         Name of a new row.
+    keeps_names : bool
+        Whether the model was taught: it brings names and its own number of segments.
     """
     list_active(settings)
     learned_from = json.dumps(sorted(names))
     own = next((row for row in settings.models if row.learned_from == learned_from), None)
     replaced = None if settings.keep_models else own
-    model.part_notes_ = PartNotes()
+    notes, model.part_notes_ = model.part_notes_, PartNotes()
     text = model.to_json()
     uid = identity(settings, text, learned_from, "" if replaced is None else replaced.uid)
     store_active(settings)
@@ -118,6 +120,9 @@ def learned(
     settings.model = text
     lines = [*summary, *certainty_lines(model)]
     settings.model_summary, settings.model_summary_messages = as_text(lines), as_json(lines)
+    if keeps_names:
+        settings.keep_notes(SetNotes.of(notes))
+        _show_number(settings, row)
     return str(row.labels())
 
 

@@ -32,6 +32,7 @@ from .followed_settings import values_of
 from .model_ranking import NamedModel, fit_warning, models_of
 from .pipeline import LabelRequest
 from .report import Report, absent_warnings, pose_warnings, segment_warnings, shape_warnings
+from .teaching import Lesson, read_lesson, read_lesson_poses
 
 LEARN_SHARE = 0.97
 """Share of the progress of a job that learns before labeling: what takes long is known from learning."""
@@ -78,6 +79,8 @@ class SegmentationJob:
         The job that this one repeats with other settings.
     labels
         The part of each polygon of each character, once computed.
+    lesson : Lesson, optional
+        The parts that the model is taught, if it learns named ones.
     """
 
     model: PoseSegmentation
@@ -95,6 +98,7 @@ class SegmentationJob:
     described: list[Workpiece] = field(default_factory=list)
     first: SegmentationJob | None = None
     labels: dict[Character, IntArray] = field(default_factory=dict)
+    lesson: Lesson | None = None
     _weights: dict[Character, dict[int, FloatArray]] | None = None
 
     @classmethod
@@ -107,6 +111,19 @@ class SegmentationJob:
         asked = {"FRAMES": settings.pose_count - len(report.left_out), "MARKERS": 1}.get(settings.source)
         report.warn(*report.left_out, *pose_warnings(report.poses, asked))
         return cls._read(context, settings.new_model(), report, cache, learns=True)
+
+    @classmethod
+    def teaching(cls, context: bpy.types.Context, cache: Cache) -> SegmentationJob:
+        """Read the parts of the selected characters, and poses to learn them from; UserError if they cannot be used."""
+        settings, report = context.scene.wks_segment, Report([])
+        with report.stage("read"):
+            objects = without_transferred(selected_meshes(context), report)
+            report.poses = read_lesson_poses(context, objects, report)
+            lesson = read_lesson(settings, report.poses, report)
+        report.warn(*report.left_out)
+        job = cls._read(context, settings.new_model(), report, cache, learns=True)
+        job = replace(job, lesson=lesson)
+        return replace(job, name=job.identity())
 
     @classmethod
     def applying(
@@ -169,6 +186,10 @@ class SegmentationJob:
         for pose in self.poses:
             digest.update(repr((pose.name, [member.name for member in pose.character.members])).encode())
             digest.update(pose.mesh.vertices.tobytes())
+        if self.lesson is not None:
+            digest.update(repr((self.lesson.names, self.lesson.unlabeled)).encode())
+            for labels in self.lesson.labels:
+                digest.update(labels.tobytes())
         return digest.hexdigest()
 
     def with_settings(
@@ -245,7 +266,7 @@ class SegmentationJob:
         run = Run(self.report, progress, self.cache)
         if self.learns:
             run = run.with_progress(progress.part(0.0, LEARN_SHARE))
-            self.described = pipeline.learn(self.model, self.poses, run)
+            self.described = pipeline.learn(self.model, self.poses, run, self.lesson)
             return progress.part(LEARN_SHARE, 1.0)
         self.described, rest = describing.describe_to_label(self.model, self.poses, run)
         return rest
@@ -267,7 +288,9 @@ class SegmentationJob:
             origin = Message("From {names}", names=first_names + " …" * (len(names) > 3))
             lines = [origin, *self.report.facts[:3], *self.report.choices]
             members = [member.name for pose in self.poses for member in pose.character.members]
-            labels = model_library.learned(settings, copy(self.model), lines, members, first_names)
+            labels = model_library.learned(
+                settings, copy(self.model), lines, members, first_names, keeps_names=self.lesson is not None
+            )
             self.uid = part_ids.model_of(labels)
             return labels
         return model_library.adjusted(settings, self.uid, copy(self.model))

@@ -1,0 +1,102 @@
+"""Reads what *Learn from My Parts* learns: the poses of all selected characters, and their parts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import bpy
+
+from ...core.mesh.triangle_mesh import IntArray
+from ...core.message import Message
+from ...rigs import parts_of_faces
+from ..errors import UserError
+from ..outputs.taught_parts import BONES, TaughtParts, taught_parts
+from ..props.settings import WKSSegmentSettings
+from ..scene import poses as reader
+from ..scene.bone_weights import bone_tree_of
+from ..scene.characters import Character, group, quoted
+from ..scene.pose_sources import read_training_poses
+from ..scene.poses import Pose
+from ..scene.simulations import check_simulations
+from . import bone_list
+from .report import Report
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """What a model is taught.
+
+    Attributes
+    ----------
+    names : list of str
+        Names of the parts.
+    labels : list of (m,) int arrays
+        For each pose, the part of each triangle; −1 where none is said.
+    unlabeled : "learn" or "ignore"
+        What becomes of faces without a part.
+    """
+
+    names: list[str]
+    labels: list[IntArray]
+    unlabeled: str
+
+
+def read_lesson(settings: WKSSegmentSettings, poses: Sequence[Pose], told: Report) -> Lesson:
+    """The parts of the characters of poses, read from the source that the settings name.
+
+    Raises
+    ------
+    UserError
+        If there are none.
+    """
+    characters = list(dict.fromkeys(pose.character for pose in poses))
+    if settings.parts_from == BONES:
+        parts = _parts_from_bones(settings, characters)
+    else:
+        parts = taught_parts(
+            characters, settings.parts_from, settings.taught_sides, settings.all_face_sets, told.choices
+        )
+    names, labels = parts.of_poses(poses)
+    if not names:
+        raise UserError("No pose shows a part: are the faces of all parts masked or removed by modifiers?")
+    unseen = [name for name in parts.names if name not in names]
+    if unseen:
+        told.warn(Message("No pose shows {names}: not learned", names=quoted(unseen)))
+    if settings.unlabeled == "ignore" and len(names) < 2:
+        raise UserError(
+            'There is only one part, "{name}": add another one, or set Other Faces to Find Segments', name=names[0]
+        )
+    return Lesson(names, labels, settings.unlabeled)
+
+
+def read_lesson_poses(context: bpy.types.Context, objects: Sequence[bpy.types.Object], told: Report) -> list[Pose]:
+    """Poses of all characters of some objects, each in the poses that the settings name, without repetitions.
+
+    Raises
+    ------
+    UserError
+        If they cannot be used.
+    """
+    settings = context.scene.wks_segment
+    if settings.source == "OBJECTS":
+        characters = group(objects, together=settings.one_character)
+        check_simulations(context.scene, characters, over_time=False)
+        return reader.read_objects(context, characters)
+    found: list[Pose] = []
+    for character in group(objects):
+        own: list[Pose] = []
+        for pose in read_training_poses(context, settings, told, character.objects):
+            if not any(pose.is_like(other) for other in own):
+                own.append(pose)
+        found += own
+    return found
+
+
+def _parts_from_bones(settings: WKSSegmentSettings, characters: Sequence[Character]) -> TaughtParts:
+    """Parts of characters by the bones that move them."""
+    trees = [bone_tree_of(character) for character in characters]
+    own, names = bone_list.own_rows(trees, settings)
+    found = parts_of_faces(trees, own, settings.taught_sides, names)
+    labels = dict(zip(characters, found.labels, strict=True))
+    return TaughtParts([part.full_name for part in found.parts], labels)
