@@ -19,6 +19,7 @@ from .operators.learn import WKS_SEGMENT_OT_learn
 from .operators.load_model import WKS_SEGMENT_OT_load_model
 from .operators.merge_segments import WKS_SEGMENT_OT_merge_segments
 from .operators.model_list import WKS_SEGMENT_OT_duplicate_model, WKS_SEGMENT_OT_remove_model, WKS_SEGMENT_OT_use_model
+from .operators.name_parts import WKS_SEGMENT_OT_name_parts
 from .operators.name_segment import WKS_SEGMENT_OT_name_segment
 from .operators.rank import WKS_SEGMENT_OT_rank
 from .operators.restore_segments import WKS_SEGMENT_OT_refresh_segments, WKS_SEGMENT_OT_restore_segments
@@ -55,6 +56,7 @@ from .workflow.property_changes import PropertyChanges
 
 OPERATORS = (
     WKS_SEGMENT_OT_learn,
+    WKS_SEGMENT_OT_name_parts,
     WKS_SEGMENT_OT_teach,
     WKS_SEGMENT_OT_list_bones,
     WKS_SEGMENT_OT_apply,

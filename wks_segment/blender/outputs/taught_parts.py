@@ -17,7 +17,7 @@ from ..parts import part_ids
 from ..props.label_set import style_of
 from ..scene.characters import Character, quoted
 from ..scene.poses import Pose
-from .import_labels import FACE_SETS, MATERIALS, membership_of
+from .import_labels import FACE_SETS, membership_of
 from .origin import origin_of
 from .part_attributes import labels_on
 
@@ -27,9 +27,11 @@ UNPAINTED_FACE_SET = 1
 """The face set that Blender gives to faces that nobody painted."""
 
 
+LEAST_FACES = 3
+"""Fewest triangles of a part, on all poses together; the core refuses fewer."""
 NO_PART = (
-    "There is no part: paint a face set beside the one that all faces have, fill a vertex group or assign a material, or "
-    "take the parts from something else"
+    "There is no part: paint a face set beside the one that all faces have, fill a vertex group or assign a material, "
+    "or take the parts from something else"
 )
 
 
@@ -49,13 +51,16 @@ class TaughtParts:
     labels: Mapping[Character, IntArray]
 
     def of_poses(self, poses: Sequence[Pose]) -> tuple[list[str], list[IntArray]]:
-        """Names of the parts that poses show, and for each pose the (m,) number of each triangle, without gaps."""
+        """Names of the parts that poses show, and for each pose the (m,) number of each triangle, without gaps.
+
+        A part of fewer than `LEAST_FACES` triangles is none: so small a one is a slip of the brush.
+        """
         found = []
         for pose in poses:
             parts = self.labels[pose.character][pose.polygon_of]
             found.append(np.where(pose.polygon_of >= 0, parts, -1))
-        shown = np.unique(np.concatenate(found))
-        shown = shown[shown >= 0]
+        shown, counts = np.unique(np.concatenate(found), return_counts=True)
+        shown = shown[(shown >= 0) & (counts >= LEAST_FACES)]
         renumbered = np.full(len(self.names) + 1, -1)
         renumbered[shown] = np.arange(len(shown))
         return [self.names[part] for part in shown], [renumbered[parts] for parts in found]
@@ -135,7 +140,7 @@ def _named(obj: bpy.types.Object, source: str, all_face_sets: bool) -> tuple[lis
             unpainted = isinstance(key, int) and key <= UNPAINTED_FACE_SET
             names.append(None if unpainted and not all_face_sets else f"Face Set {key}")
         else:
-            names.append(str(key.name) if source == MATERIALS else str(key))
+            names.append(key.name if isinstance(key, bpy.types.Material) else str(key))
     return names, found.index
 
 

@@ -32,6 +32,8 @@ MAX_NAME_LETTERS = 60
 """Letters of a model's name; Blender's own names have at most 63 bytes."""
 LEARNED_FROM = "learned_from"
 """Field of a model file for the lines on what the model was learned from."""
+STARTER_FOLDER = Path(__file__).parents[2] / "models"
+"""Folder of the models that come with the extension. They are only read: applying one adds a copy to the scene."""
 ROW_STORES = {
     "model": "model",
     "summary": "model_summary",
@@ -184,6 +186,18 @@ def add_model(settings: WKSSegmentSettings, model: PoseSegmentation, name: str, 
     return str(row.labels())
 
 
+def add_once(settings: WKSSegmentSettings, model: PoseSegmentation, name: str, summary: Sequence[str]) -> str:
+    """Add a model that comes with the extension, unless it is in the list, and use it; return its label set's key."""
+    source = f"{name} {blake2b(model.to_json().encode(), digest_size=8).hexdigest()}"
+    for i, row in enumerate(settings.models):
+        if row.learned_from == source:
+            use(settings, i)
+            return str(row.labels())
+    labels = add_model(settings, model, name, summary)
+    settings.models[settings.used_model].learned_from = source
+    return labels
+
+
 def use(settings: WKSSegmentSettings, index: int) -> None:
     """Use the model of a row, with its names and colors. Labels on meshes stay until it is applied."""
     list_active(settings)
@@ -254,6 +268,11 @@ def in_folder(folder: str | Path) -> dict[str, Path]:
     if not str(folder) or not path.is_dir():
         return {}
     return {name_of(file): file for file in sorted(path.glob("*.json"))}
+
+
+def starters() -> dict[str, Path]:
+    """Files of the models that come with the extension, by name."""
+    return in_folder(STARTER_FOLDER)
 
 
 def all_of(settings: WKSSegmentSettings) -> Iterator[tuple[str, str]]:

@@ -128,11 +128,12 @@ class SegmentationJob:
     @classmethod
     def applying(
         cls, context: bpy.types.Context, cache: Cache, model: PoseSegmentation | None = None,
-        objects: Sequence[bpy.types.Object] = (), uid: str = "",
+        objects: Sequence[bpy.types.Object] = (), uid: str = "", keeps_number: bool = False,
     ) -> SegmentationJob:  # fmt: skip
         """Read objects to apply a model to: the selected ones and the model in use if none are given.
 
-        The model is applied with the number of segments in the settings; `uid` is its identity, if it is of the scene.
+        The model is applied with the number of segments in the settings, unless it keeps its own; `uid` is its
+        identity, if it is of the scene.
 
         Raises
         ------
@@ -144,7 +145,9 @@ class SegmentationJob:
             model, uid = pipeline.stored_model(settings), model_library.used_uid(settings)
         model.smoothness = settings.smoothness
         number = settings.number()
-        if number not in ("auto", min(model.n_segments_, MAX_COLORS), model.n_segments):
+        if not keeps_number and model.taught_ is not None:
+            _show_number_of(model, settings, report)
+        elif not keeps_number and number not in ("auto", min(model.n_segments_, MAX_COLORS), model.n_segments):
             try:
                 model = model.with_segments(number)
             except ValueError as error:
@@ -178,6 +181,12 @@ class SegmentationJob:
             request, guard = LabelRequest.of(settings, characters), ChangeGuard(context.scene, characters)
         job = cls(model, poses, request, guard, report, learns, settings.number(), cache, values_of(settings), uid)
         return replace(job, name=job.identity())
+
+    def take_number(self) -> None:
+        """Count as labeled with the number of segments that the model has, whatever the settings ask for."""
+        if self.number != "auto":
+            self.number = min(self.model.n_segments_, MAX_COLORS)
+            self.values = {**self.values, "n_segments": self.number}
 
     def identity(self) -> str:
         """A hash of the model and the poses, the same whenever the same is done with the same meshes."""
@@ -213,7 +222,9 @@ class SegmentationJob:
         report = Report(first.poses, first.report.laplacians)
         model = copy(first.model)
         model.smoothness = settings.smoothness
-        if number != first.number:
+        if number != first.number and model.taught_ is not None:
+            _show_number_of(model, settings, report)
+        elif number != first.number:
             # Regions are learned anew only where sides need them; labels of one part for both sides do not.
             described = first.described if first.learns and settings.sides == "two" else []
             try:
@@ -267,6 +278,8 @@ class SegmentationJob:
         if self.learns:
             run = run.with_progress(progress.part(0.0, LEARN_SHARE))
             self.described = pipeline.learn(self.model, self.poses, run, self.lesson)
+            if self.lesson is not None:
+                self.take_number()
             return progress.part(LEARN_SHARE, 1.0)
         self.described, rest = describing.describe_to_label(self.model, self.poses, run)
         return rest
@@ -294,6 +307,16 @@ class SegmentationJob:
             self.uid = part_ids.model_of(labels)
             return labels
         return model_library.adjusted(settings, self.uid, copy(self.model))
+
+
+def _show_number_of(model: PoseSegmentation, settings: WKSSegmentSettings, report: Report) -> None:
+    """Show the number of a taught model's segments in the field; the report is told if another one was asked for."""
+    number = min(model.n_segments_, MAX_COLORS)
+    if settings.number() in ("auto", number):
+        return
+    report.warn(Message("The model has the {count} segments that it was taught", count=model.n_segments_))
+    with unheard():
+        settings.n_segments = number
 
 
 def without_transferred(objects: Sequence[bpy.types.Object], report: Report) -> list[bpy.types.Object]:
