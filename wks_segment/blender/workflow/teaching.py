@@ -11,7 +11,7 @@ from ...core.mesh.triangle_mesh import IntArray
 from ...core.message import Message
 from ...rigs import parts_of_faces
 from ..errors import UserError
-from ..outputs.taught_parts import BONES, TaughtParts, taught_parts
+from ..outputs.taught_parts import BONES, LEAST_FACES, TaughtParts, taught_parts
 from ..props.settings import WKSSegmentSettings
 from ..scene import poses as reader
 from ..scene.bone_weights import bone_tree_of
@@ -62,7 +62,13 @@ def read_lesson(settings: WKSSegmentSettings, poses: Sequence[Pose], told: Repor
         raise UserError("No pose shows a part: are the faces of all parts masked or removed by modifiers?")
     unseen = [name for name in parts.names if name not in names]
     if unseen:
-        told.warn(Message("No pose shows {names}: not learned", names=quoted(unseen)))
+        told.warn(
+            Message(
+                "Not learned, since the poses show fewer than {least} faces of it: {names}",
+                least=LEAST_FACES,
+                names=quoted(unseen),
+            )
+        )
     if settings.unlabeled == "ignore" and len(names) < 2:
         raise UserError(
             'There is only one part, "{name}": add another one, or set Other Faces to Find Segments', name=names[0]
