@@ -80,8 +80,8 @@ class LearnedOnce:
     def fit(self, model, *arguments, **options):
         given = SIGNATURE.bind(model, *arguments, **options)
         given.apply_defaults()
-        _, meshes, progress, rest, cache = given.args
-        if self.anew or not all(hasattr(mesh, "signature") or hasattr(mesh, "pose") for mesh in meshes):
+        _, meshes, progress, rest, cache, *taught = given.args
+        if self.anew or (taught and taught[0] is not None) or not all(hasattr(mesh, "signature") or hasattr(mesh, "pose") for mesh in meshes):
             return FIT(*given.args)
         parameters = inspect.signature(type(model)).parameters
         key = key_of({name: getattr(model, name) for name in parameters}, meshes, rest, cache is not None)
