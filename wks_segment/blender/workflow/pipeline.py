@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...core import PartNotes, PoseSegmentation, Workpiece
+from ...core.learning.taught_parts import UnlikePartsError
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ...core.message import Message, message_of
 from ...core.poses.describe import LEARNING
@@ -119,14 +120,41 @@ def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run, lesson: Less
             if lesson is None:
                 model.fit(described, progress, poses[0].upright, run.cache)
             else:
-                model.fit(
-                    described, progress, poses[0].upright, run.cache, labels=lesson.labels, unlabeled=lesson.unlabeled
-                )
-                model.part_notes_ = PartNotes(names=dict(enumerate(lesson.names)))
+                _fit_to(lesson, model, described, poses[0], run.with_progress(progress))
         except ValueError as error:
             raise UserError("The segments could not be learned: {reason}", reason=message_of(error)) from error
     run.report.add_model(model)
     return described
+
+
+def _fit_to(lesson: Lesson, model: PoseSegmentation, described: Sequence[Workpiece], first: Pose, run: Run) -> None:
+    """Fit a model to the parts of a lesson, which it gets the names of; parts that only names call left and right are one.
+
+    Raises
+    ------
+    UserError
+        If two other parts have the same shape.
+    ValueError
+        If the core refuses the parts.
+    """
+    while True:
+        try:
+            model.fit(
+                described, run.progress, first.upright, run.cache, labels=lesson.labels, unlabeled=lesson.unlabeled
+            )
+        except UnlikePartsError as error:
+            joined = lesson.with_sides_joined(*error.parts)
+            left, right = (lesson.names[part] for part in sorted(error.parts))
+            run.report.warn(
+                Message(
+                    '"{left}" and "{right}" are no mirror images of each other, and are learned as one part',
+                    left=left, right=right,
+                )
+            )  # fmt: skip
+            lesson = joined
+        else:
+            model.part_notes_ = PartNotes(names=dict(enumerate(lesson.names)))
+            return
 
 
 def label(

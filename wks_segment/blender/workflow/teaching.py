@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import bpy
+import numpy as np
 
 from ...core.mesh.triangle_mesh import IntArray
 from ...core.message import Message
-from ...rigs import parts_of_faces
+from ...rigs import parts_of_faces, split_side
 from ..errors import UserError
 from ..outputs.taught_parts import BONES, LEAST_FACES, TaughtParts, taught_parts
 from ..props.settings import WKSSegmentSettings
@@ -21,6 +22,9 @@ from ..scene.poses import Pose
 from ..scene.simulations import check_simulations
 from . import bone_list
 from .report import Report
+
+NOT_SAID = -1
+"""Label of faces whose part is not said; as an index it is the last one."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,27 @@ class Lesson:
     names: list[str]
     labels: list[IntArray]
     unlabeled: str
+
+    def with_sides_joined(self, first: int, second: int) -> Lesson:
+        """The lesson with two parts as one, which are left and right of each other by their names.
+
+        Raises
+        ------
+        UserError
+            If they are not; it names them.
+        """
+        (name, side), (other, other_side) = (split_side(self.names[part]) for part in (first, second))
+        if name != other or {side, other_side} != {1, 2}:
+            raise UserError(
+                '"{first}" and "{second}" have the same shape, and are not left and right of each other: teach them as '
+                "one part",
+                first=self.names[first], second=self.names[second],
+            )  # fmt: skip
+        kept, dropped = sorted((first, second))
+        names = [each for part, each in enumerate(self.names) if part != dropped]
+        names[kept] = name
+        number = np.array([*range(dropped), kept, *range(dropped, len(names)), NOT_SAID])
+        return Lesson(names, [number[labels] for labels in self.labels], self.unlabeled)
 
 
 def read_lesson(settings: WKSSegmentSettings, poses: Sequence[Pose], told: Report) -> Lesson:
