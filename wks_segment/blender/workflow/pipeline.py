@@ -128,7 +128,7 @@ def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run, lesson: Less
 
 
 def _fit_to(lesson: Lesson, model: PoseSegmentation, described: Sequence[Workpiece], first: Pose, run: Run) -> None:
-    """Fit a model to the parts of a lesson, which it gets the names of; parts that only names call left and right are one.
+    """Fit a model to the parts of a lesson, and give it their names; parts of the same shape become one if they may.
 
     Raises
     ------
@@ -143,15 +143,8 @@ def _fit_to(lesson: Lesson, model: PoseSegmentation, described: Sequence[Workpie
                 described, run.progress, first.upright, run.cache, labels=lesson.labels, unlabeled=lesson.unlabeled
             )
         except UnlikePartsError as error:
-            joined = lesson.with_sides_joined(*error.parts)
-            left, right = (lesson.names[part] for part in sorted(error.parts))
-            run.report.warn(
-                Message(
-                    '"{left}" and "{right}" are no mirror images of each other, and are learned as one part',
-                    left=left, right=right,
-                )
-            )  # fmt: skip
-            lesson = joined
+            lesson, told = lesson.joined(*error.parts)
+            run.report.warn(told)
         else:
             model.part_notes_ = PartNotes(names=dict(enumerate(lesson.names)))
             return

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -39,32 +39,50 @@ class Lesson:
         For each pose, the part of each triangle; −1 where none is said.
     unlabeled : "learn" or "ignore"
         What becomes of faces without a part.
+    from_bones : bool
+        Whether the parts are those of a rig, not an artist's.
     """
 
     names: list[str]
     labels: list[IntArray]
     unlabeled: str
+    from_bones: bool = False
 
-    def with_sides_joined(self, first: int, second: int) -> Lesson:
-        """The lesson with two parts as one, which are left and right of each other by their names.
+    def joined(self, first: int, second: int) -> tuple[Lesson, Message]:
+        """The lesson with two parts of the same shape as one, and what to tell about it.
+
+        Parts with the same name but for the side get that name. Of two other parts from bones the larger one gives the
+        name, since an artist cannot change what a rig says.
 
         Raises
         ------
         UserError
-            If they are not; it names them.
+            If an artist has made both; it names them.
         """
-        (name, side), (other, other_side) = (split_side(self.names[part]) for part in (first, second))
-        if name != other or {side, other_side} != {1, 2}:
+        one, other = self.names[first], self.names[second]
+        (name, side), (other_name, other_side) = split_side(one), split_side(other)
+        if name == other_name and {side, other_side} == {1, 2}:
+            told = Message(
+                '"{left}" and "{right}" are no mirror images of each other, and are learned as one part',
+                left=one, right=other,
+            )  # fmt: skip
+        elif self.from_bones:
+            faces = [sum(int((labels == part).sum()) for labels in self.labels) for part in (first, second)]
+            name = one if faces[0] >= faces[1] else other
+            told = Message(
+                '"{one}" and "{other}" have the same shape, and are learned as one part', one=one, other=other
+            )
+        else:
             raise UserError(
                 '"{first}" and "{second}" have the same shape, and are not left and right of each other: teach them as '
                 "one part",
-                first=self.names[first], second=self.names[second],
+                first=one, second=other,
             )  # fmt: skip
         kept, dropped = sorted((first, second))
         names = [each for part, each in enumerate(self.names) if part != dropped]
         names[kept] = name
         number = np.array([*range(dropped), kept, *range(dropped, len(names)), NOT_SAID])
-        return Lesson(names, [number[labels] for labels in self.labels], self.unlabeled)
+        return replace(self, names=names, labels=[number[labels] for labels in self.labels]), told
 
 
 def read_lesson(settings: WKSSegmentSettings, poses: Sequence[Pose], told: Report) -> Lesson:
@@ -98,7 +116,7 @@ def read_lesson(settings: WKSSegmentSettings, poses: Sequence[Pose], told: Repor
         raise UserError(
             'There is only one part, "{name}": add another one, or set Other Faces to Find Segments', name=names[0]
         )
-    return Lesson(names, labels, settings.unlabeled)
+    return Lesson(names, labels, settings.unlabeled, settings.parts_from == BONES)
 
 
 def read_lesson_poses(context: bpy.types.Context, objects: Sequence[bpy.types.Object], told: Report) -> list[Pose]:
