@@ -23,7 +23,7 @@ from .taught_parts import NOT_SAID, TaughtParts, alike_parts
 from .training_samples import TrainingSamples
 
 Unlabeled = Literal["learn", "ignore"]
-COMPONENTS_OF_MESH, COMPONENTS_OF_BODIES = 25, 6
+COMPONENTS_OF_MESH, COMPONENTS_OF_BODIES = 40, 6
 """Number of components for each taught part, from poses of one mesh and from several meshes: with more, other bodies
 are recognized worse (docs/dev/experiments.md)."""
 LEAST_LEFT = 0.01
