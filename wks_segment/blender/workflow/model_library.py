@@ -32,6 +32,8 @@ MAX_NAME_LETTERS = 60
 """Letters of a model's name; Blender's own names have at most 63 bytes."""
 LEARNED_FROM = "learned_from"
 """Field of a model file for the lines on what the model was learned from."""
+STARTER_FOLDER = Path(__file__).parents[2] / "models"
+"""Folder of the models that come with the extension. They are only read: applying one adds a copy to the scene."""
 ROW_STORES = {
     "model": "model",
     "summary": "model_summary",
@@ -84,7 +86,7 @@ def text_of(settings: WKSSegmentSettings, uid: str) -> str:
 
 def learned(
     settings: WKSSegmentSettings, model: PoseSegmentation, summary: Sequence[str], names: Sequence[str],
-    character: str,
+    character: str, keeps_names: bool = False,
 ) -> str:  # fmt: skip
     """Keep a learned model and use it; return the key of its label set.
 
@@ -100,12 +102,14 @@ def learned(
         Names of the objects that it was learned from.
     character : str
         Name of a new row.
+    keeps_names : bool
+        Whether the model was taught: it brings names and its own number of segments.
     """
     list_active(settings)
     learned_from = json.dumps(sorted(names))
     own = next((row for row in settings.models if row.learned_from == learned_from), None)
     replaced = None if settings.keep_models else own
-    model.part_notes_ = PartNotes()
+    notes, model.part_notes_ = model.part_notes_, PartNotes()
     text = model.to_json()
     uid = identity(settings, text, learned_from, "" if replaced is None else replaced.uid)
     store_active(settings)
@@ -118,6 +122,9 @@ def learned(
     settings.model = text
     lines = [*summary, *certainty_lines(model)]
     settings.model_summary, settings.model_summary_messages = as_text(lines), as_json(lines)
+    if keeps_names:
+        settings.keep_notes(SetNotes.of(notes))
+        _show_number(settings, row)
     return str(row.labels())
 
 
@@ -177,6 +184,18 @@ def add_model(settings: WKSSegmentSettings, model: PoseSegmentation, name: str, 
     settings.keep_notes(SetNotes.of(notes))
     _show_number(settings, row)
     return str(row.labels())
+
+
+def add_once(settings: WKSSegmentSettings, model: PoseSegmentation, name: str, summary: Sequence[str]) -> str:
+    """Add a model that comes with the extension, unless it is in the list, and use it; return its label set's key."""
+    source = f"{name} {blake2b(model.to_json().encode(), digest_size=8).hexdigest()}"
+    for i, row in enumerate(settings.models):
+        if row.learned_from == source:
+            use(settings, i)
+            return str(row.labels())
+    labels = add_model(settings, model, name, summary)
+    settings.models[settings.used_model].learned_from = source
+    return labels
 
 
 def use(settings: WKSSegmentSettings, index: int) -> None:
@@ -249,6 +268,11 @@ def in_folder(folder: str | Path) -> dict[str, Path]:
     if not str(folder) or not path.is_dir():
         return {}
     return {name_of(file): file for file in sorted(path.glob("*.json"))}
+
+
+def starters() -> dict[str, Path]:
+    """Files of the models that come with the extension, by name."""
+    return in_folder(STARTER_FOLDER)
 
 
 def all_of(settings: WKSSegmentSettings) -> Iterator[tuple[str, str]]:

@@ -13,7 +13,8 @@ import bpy
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...core import PoseSegmentation, Workpiece
+from ...core import PartNotes, PoseSegmentation, Workpiece
+from ...core.learning.taught_parts import UnlikePartsError
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ...core.message import Message, message_of
 from ...core.poses.describe import LEARNING
@@ -34,6 +35,7 @@ from ..scene.poses import Pose
 from . import carry_over, model_library, segment_list
 from .describing import Run, describe, prepare
 from .report import Report
+from .teaching import Lesson
 
 SEGMENT_SHARE = 0.6
 """Share of the labeling progress that is spent on segments; the rest tells left from right. A wrong share only makes
@@ -93,8 +95,8 @@ def check_limits(model: PoseSegmentation, poses: Sequence[Pose], settings: WKSSe
     )
 
 
-def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[Workpiece]:
-    """Fit a model to poses; return the described poses.
+def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run, lesson: Lesson | None = None) -> list[Workpiece]:
+    """Fit a model to poses, and to the parts of a lesson if there is one; return the described poses.
 
     Raises
     ------
@@ -102,7 +104,7 @@ def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[Work
         If the core refuses a pose or the model's parameters; the message names it.
     """
     n_faces = max(int(pose.polygon_of.max()) + 1 for pose in poses)
-    if model.n_segments != "auto" and model.n_segments > n_faces:
+    if lesson is None and model.n_segments != "auto" and model.n_segments > n_faces:
         raise UserError(
             '"{character}" has too few faces ({faces}) for {segments} segments: take fewer segments, or subdivide it',
             character=poses[0].character.name,
@@ -115,11 +117,37 @@ def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[Work
     progress = run.progress.part(share, 1.0).titled("Learning the segments")
     with run.report.stage("mixture"):
         try:
-            model.fit(described, progress, poses[0].upright, run.cache)
+            if lesson is None:
+                model.fit(described, progress, poses[0].upright, run.cache)
+            else:
+                _fit_to(lesson, model, described, poses[0], run.with_progress(progress))
         except ValueError as error:
             raise UserError("The segments could not be learned: {reason}", reason=message_of(error)) from error
     run.report.add_model(model)
     return described
+
+
+def _fit_to(lesson: Lesson, model: PoseSegmentation, described: Sequence[Workpiece], first: Pose, run: Run) -> None:
+    """Fit a model to the parts of a lesson, and give it their names; parts of the same shape become one if they may.
+
+    Raises
+    ------
+    UserError
+        If two other parts have the same shape.
+    ValueError
+        If the core refuses the parts.
+    """
+    while True:
+        try:
+            model.fit(
+                described, run.progress, first.upright, run.cache, labels=lesson.labels, unlabeled=lesson.unlabeled
+            )
+        except UnlikePartsError as error:
+            lesson, told = lesson.joined(*error.parts)
+            run.report.warn(told)
+        else:
+            model.part_notes_ = PartNotes(names=dict(enumerate(lesson.names)))
+            return
 
 
 def label(

@@ -361,5 +361,23 @@ GERMAN_MESSAGES = {
     "its parts contain each other in a circle, or are nested too deeply": "ihre Teile enthalten einander im Kreis oder sind zu tief verschachtelt",
     "its importer failed ({error}), so it is damaged or of a kind that the importer does not know": "der Importer ist gescheitert ({error}), sie ist also beschädigt oder von einer Art, die er nicht kennt",
     "{path} …: the name is too long: take at most {name} bytes, and {whole} with all folders": "{path} …: der Name ist zu lang: höchstens {name} Bytes nehmen, und {whole} mit allen Ordnern",
+    # Parts that a model is taught, and models that come with the extension.
+    "there is no bone: parts from bones need an armature": "es gibt keinen Knochen: Teile aus Knochen brauchen eine Armatur",
+    "none of the {count} bones has weights on the mesh: weight the mesh first (Parent > With Automatic Weights), or take the parts from something else": "keiner der {count} Knochen hat Gewichte auf dem Mesh: das Mesh erst gewichten (Übergeordnet > Mit automatischen Gewichten), oder die Teile aus etwas anderem nehmen",
+    'only the bone "{bone}" moves the mesh: there is nothing to divide it by': 'nur der Knochen "{bone}" bewegt das Mesh: es gibt nichts, wonach es zu teilen wäre',
+    'the bone "{bone}" is its own parent': 'der Knochen "{bone}" ist sich selbst übergeordnet',
+    "there are weights of {weights} vertices, but the mesh has {vertices}": "es gibt Gewichte von {weights} Vertices, aber das Mesh hat {vertices}",
+    "There is no part: paint a face set beside the one that all faces have, fill a vertex group or assign a material, or take the parts from something else": "Es gibt keinen Teil: neben dem Face Set, das alle Flächen haben, eines malen, eine Vertexgruppe füllen oder ein Material zuweisen, oder die Teile aus etwas anderem nehmen",
+    "{names} has no parts and is left to the model": "{names} hat keine Teile und bleibt dem Modell überlassen",
+    '"{name}" has no segments: make some first, or take the parts from bones': '"{name}" hat keine Segmente: erst welche anlegen, oder die Teile aus Knochen nehmen',
+    '"{name}" has no armature: select a rigged mesh, or take the parts from something else': '"{name}" hat keine Armatur: ein Mesh mit Rig auswählen, oder die Teile aus etwas anderem nehmen',
+    "does not fit": "passt nicht",
+    "The model has the {count} segments that it was taught": "Das Modell hat die {count} Segmente, die es gelehrt wurde",
+    "This copy of the extension has no starter models: install it again": "Dieser Kopie der Erweiterung fehlen die beiliegenden Modelle: erneut installieren",
+    "{names} is like none of the starter models ({models}): learn a model from poses or from your own parts, or add a starter model by the folder button and apply it all the same": "{names} gleicht keinem der beiliegenden Modelle ({models}): ein Modell aus Posen oder aus eigenen Teilen lernen, oder ein beiliegendes Modell mit dem Ordner-Knopf hinzufügen und trotzdem anwenden",
+    "the starter models": "den beiliegenden Modellen",
+    "No pose shows a part: are the faces of all parts masked or removed by modifiers?": "Keine Pose zeigt einen Teil: sind die Flächen aller Teile von Modifikatoren maskiert oder entfernt?",
+    "Not learned, since the poses show fewer than {least} faces of it: {names}": "Nicht gelernt, da die Posen weniger als {least} Flächen davon zeigen: {names}",
+    'There is only one part, "{name}": add another one, or set Other Faces to Find Segments': 'Es gibt nur einen Teil, "{name}": einen weiteren anlegen, oder Andere Flächen auf Segmente finden stellen',
 }
 """By English template."""
