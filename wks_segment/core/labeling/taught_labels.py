@@ -1,0 +1,81 @@
+"""What a model of taught parts knows of their regions: which are left and right; and whether it finds the parts again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..learning.part_mixture import PartMixture
+from ..learning.taught_parts import TaughtParts, UnlikePartsError
+from ..mesh.triangle_mesh import IntArray, TriangleMesh
+from ..poses.pose_cache import Workpiece
+from ..progress import Progress
+from .labeler import Labeler
+from .region_atlas import RegionAtlas
+from .taught_sides import oriented, sides_by_labels
+
+LEAST_FOUND = 0.25
+"""Share of the area of a taught part that must be found again on the mesh that it was taught on, if another part is
+found there: with less, the two cannot be told apart. Half of it is what chance finds."""
+
+
+def recognized_taught_parts(
+    labeler: Labeler,
+    learned: PartMixture,
+    poses: Sequence[Workpiece],
+    labels: Sequence[IntArray],
+    rest: TriangleMesh | None,
+    progress: Progress,
+) -> tuple[PartMixture, tuple[RegionAtlas, RegionAtlas]]:
+    """Atlases of the regions of taught parts, and the parts with left and right in their places.
+
+    Parameters
+    ----------
+    labeler : Labeler
+        Of the model, without an atlas.
+    learned : PartMixture
+    poses
+        The learned poses.
+    labels
+        For each pose the taught part of each face, −1 for none.
+    rest : TriangleMesh or None
+        The mesh of the first pose at rest.
+    progress : Progress
+
+    Raises
+    ------
+    UnlikePartsError
+        If a taught part is not found again, but another one in its place.
+    """
+    assert learned.taught is not None
+    # The first pose tells left from right: the one that shows the most parts.
+    first = int(np.argmax([len(np.unique(of_mesh)) for of_mesh in labels]))
+    same_mesh = np.array_equal(poses[first].surface.original.faces, poses[0].surface.original.faces)
+    at_rest = rest if rest is not None and same_mesh else None
+    in_order = [poses[first], *poses[:first], *poses[first + 1 :]]
+    mesh = in_order[0].surface.original
+    taught = oriented(learned.taught, labels[first], mesh if at_rest is None else at_rest)
+    labeler = replace(labeler, taught=taught)
+    atlases = labeler.atlases(in_order, at_rest, progress.part(0.0, 0.7))
+    region = labeler.learned_regions(atlases[1], in_order)
+    side = sides_by_labels(atlases[1].side, region, taught, labels[first], mesh.face_areas)
+    wholes, sides = (replace(atlas, side=side) if atlas is atlases[1] else atlas for atlas in atlases)
+    _check_found(replace(labeler, sides_atlas=sides), in_order[0], labels[first], taught, progress.part(0.7, 1.0))
+    return replace(learned, taught=taught), (wholes, sides)
+
+
+def _check_found(
+    labeler: Labeler, pose: Workpiece, labels: IntArray, taught: TaughtParts, progress: Progress
+) -> None:
+    """UnlikePartsError if a part of the mesh has another label almost everywhere where it was taught."""
+    found = labeler.segments([pose], None, labeler.min_share, progress)[0]
+    areas = pose.surface.original.face_areas
+    said = (labels >= 0) & (found >= 0) & (found < taught.n_parts)
+    table = np.zeros((taught.n_parts, taught.n_parts))
+    np.add.at(table, (labels[said], found[said]), areas[said])
+    for part in np.flatnonzero(table.sum(axis=1) > 0):
+        other = int(table[part].argmax())
+        if other != part and table[part, part] < LEAST_FOUND * table[part].sum():
+            raise UnlikePartsError(*sorted((int(part), other)))
