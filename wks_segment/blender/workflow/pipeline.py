@@ -43,8 +43,8 @@ the progress bar uneven."""
 
 
 TAUGHT_MIN_SHARE = 0.2
-"""How much smaller a region of a taught part may be than *Smallest Part* says: a paw of a fox has 0.5 % of the area, and
-is wanted if it was taught."""
+"""How much smaller a region of a taught part may be than *Smallest Part* says: a paw of a fox has 0.5 % of the area,
+and is wanted if it was taught."""
 
 
 @dataclass(frozen=True)
