@@ -75,9 +75,8 @@ def test_strokes_of_face_sets_leave_the_rest_unsaid():
 def test_vertex_groups():
     obj = limbed()
     inside = right(obj)
-    obj.vertex_groups.new(name="hand_l").add(
-        [i for polygon, there in zip(obj.data.polygons, inside, strict=True) if there for i in polygon.vertices], 1, "ADD"
-    )
+    vertices = [i for polygon, there in zip(obj.data.polygons, inside, strict=True) if there for i in polygon.vertices]
+    obj.vertex_groups.new(name="hand_l").add(vertices, 1, "ADD")
     names, (labels,) = read("VERTEX_GROUPS", obj)
     assert names == ["hand.L"]
     assert (labels >= 0)[inside].all()

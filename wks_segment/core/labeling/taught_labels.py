@@ -66,9 +66,7 @@ def recognized_taught_parts(
     return replace(learned, taught=taught), (wholes, sides)
 
 
-def _check_found(
-    labeler: Labeler, pose: Workpiece, labels: IntArray, taught: TaughtParts, progress: Progress
-) -> None:
+def _check_found(labeler: Labeler, pose: Workpiece, labels: IntArray, taught: TaughtParts, progress: Progress) -> None:
     """UnlikePartsError if a part of the mesh has another label almost everywhere where it was taught."""
     found = labeler.segments([pose], None, labeler.min_share, progress)[0]
     areas = pose.surface.original.face_areas
