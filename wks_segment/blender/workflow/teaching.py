@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ...core.learning.taught_parts import Unlabeled
+from ...core.learning.taught_parts import LEAST_FACES, NOT_SAID, Unlabeled
 from ...core.mesh.triangle_mesh import IntArray
 from ...core.message import Message
 from ...rigs import parts_of_faces, split_side
 from ..errors import UserError
-from ..outputs.taught_parts import BONES, LEAST_FACES, TaughtParts, taught_parts
+from ..outputs.taught_parts import BONES, TaughtParts, taught_parts
 from ..props.settings import WKSSegmentSettings
 from ..scene import poses as reader
 from ..scene.bone_weights import bone_tree_of
@@ -23,9 +23,6 @@ from ..scene.poses import Pose
 from ..scene.simulations import check_simulations
 from . import bone_list
 from .report import Report
-
-NOT_SAID = -1
-"""Label of faces whose part is not said; as an index it is the last one."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +79,7 @@ class Lesson:
         kept, dropped = sorted((first, second))
         names = [each for part, each in enumerate(self.names) if part != dropped]
         names[kept] = name
+        # As an index, the number of what is not said is the last one.
         number = np.array([*range(dropped), kept, *range(dropped, len(names)), NOT_SAID])
         return replace(self, names=names, labels=[number[labels] for labels in self.labels]), told
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 
+from ..learning.parameters import Preset
 from ..learning.part_mixture import PartMixture
-from ..learning.taught_parts import TaughtParts, UnlikePartsError
+from ..learning.taught_parts import TaughtLabels, TaughtParts, Unlabeled, UnlikePartsError, checked_labels
 from ..mesh.triangle_mesh import IntArray, TriangleMesh
-from ..poses.pose_cache import Workpiece
+from ..message import Message
+from ..poses.arguments import as_list
+from ..poses.pose_cache import AnyPose, Workpiece
 from ..progress import Progress
 from .labeler import Labeler
 from .region_atlas import RegionAtlas
@@ -19,6 +23,57 @@ from .taught_sides import oriented, sides_by_labels
 LEAST_FOUND = 0.25
 """Share of the area of a taught part that must be found again on the mesh that it was taught on, if another part is
 found there: with less, the two cannot be told apart. Half of it is what chance finds."""
+
+
+GROUPED_SHARE = 0.7
+"""Share of the time of learning taught parts after which their mixture is known."""
+
+
+def lesson_of(
+    labels: Sequence[IntArray | None], meshes: Sequence[AnyPose], unlabeled: Unlabeled, preset: Preset
+) -> TaughtLabels:
+    """What `fit` is taught by its arguments; ValueError if labels do not fit, or cannot be learned."""
+    if preset == "paper":
+        raise ValueError('parts are taught with preset="default": with the paper\'s setting each component is a part')
+    if unlabeled not in get_args(Unlabeled):
+        raise ValueError(Message('unlabeled must be "learn" or "ignore", not {value!r}', value=unlabeled))
+    originals = [mesh if isinstance(mesh, TriangleMesh) else mesh.surface.original for mesh in meshes]
+    of_faces = checked_labels(as_list(labels, "labels"), [mesh.n_faces for mesh in originals])
+    return TaughtLabels(of_faces, unlabeled)
+
+
+def learned_lesson(
+    lesson: TaughtLabels,
+    learn: Callable[[TaughtLabels, Progress], PartMixture],
+    labeler_of: Callable[[PartMixture], Labeler],
+    poses: Sequence[Workpiece],
+    rest: TriangleMesh | None,
+    progress: Progress,
+) -> tuple[PartMixture, tuple[RegionAtlas, RegionAtlas]]:
+    """Parts that were taught, and their regions; two alike ones that are no left and right are learned apart.
+
+    Parameters
+    ----------
+    lesson : TaughtLabels
+    learn, labeler_of
+        Fit a mixture to a lesson, and make the labeler of a mixture, without an atlas.
+    poses, rest, progress
+        As for `recognized_taught_parts`.
+
+    Raises
+    ------
+    UnlikePartsError
+        If a part is not found again all the same.
+    """
+    while True:
+        learned = learn(lesson, progress.part(0.0, GROUPED_SHARE))
+        step = progress.part(GROUPED_SHARE, 1.0)
+        try:
+            return recognized_taught_parts(labeler_of(learned), learned, poses, lesson.of_faces, rest, step)
+        except UnlikePartsError as error:
+            if learned.taught is None or not learned.taught.has_pair(*error.parts):
+                raise
+            lesson = replace(lesson, apart=lesson.apart | {error.parts})
 
 
 def recognized_taught_parts(
