@@ -22,7 +22,7 @@ def starter(settings, starter_folder):
     settings.parts_from = "MATERIALS"
     select(obj)
     OPS.teach()
-    path = starter_folder / "Ball.json"
+    path = starter_folder / "ball.json"
     OPS.save_model(filepath=str(path))
     OPS.remove_model()
     OPS.clear()

@@ -272,7 +272,7 @@ def in_folder(folder: str | Path) -> dict[str, Path]:
 
 def starters() -> dict[str, Path]:
     """Files of the models that come with the extension, by name."""
-    return in_folder(STARTER_FOLDER)
+    return {name.capitalize(): path for name, path in in_folder(STARTER_FOLDER).items()}
 
 
 def all_of(settings: WKSSegmentSettings) -> Iterator[tuple[str, str]]:

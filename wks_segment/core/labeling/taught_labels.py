@@ -1,4 +1,4 @@
-"""What a model of taught parts knows of their regions: which are left and right; and whether it finds the parts again."""
+"""What a model of taught parts knows of their regions: which are left and right, and whether it finds them again."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from .labeler import Labeler
 from .region_atlas import RegionAtlas
 from .taught_sides import oriented, sides_by_labels
 
-LEAST_FOUND = 0.25
-"""Share of the area of a taught part that must be found again on the mesh that it was taught on, if another part is
-found there: with less, the two cannot be told apart. Half of it is what chance finds."""
+LEAST_FOUND = 0.75
+"""Least share of the area of a left or right part that has its label, and not the other one, on the mesh that it was
+taught on: with less they are not left and right, and nothing else tells them apart. Chance finds a half."""
 
 
 GROUPED_SHARE = 0.7
@@ -102,7 +102,7 @@ def recognized_taught_parts(
     Raises
     ------
     UnlikePartsError
-        If a taught part is not found again, but another one in its place.
+        If two taught parts are alike, and not left and right of each other.
     """
     assert learned.taught is not None
     # The first pose tells left from right: the one that shows the most parts.
@@ -122,13 +122,13 @@ def recognized_taught_parts(
 
 
 def _check_found(labeler: Labeler, pose: Workpiece, labels: IntArray, taught: TaughtParts, progress: Progress) -> None:
-    """UnlikePartsError if a part of the mesh has another label almost everywhere where it was taught."""
+    """UnlikePartsError if one of two parts that differ by side has the label of the other where it was taught."""
+    if not len(taught.sided):
+        return
     found = labeler.segments([pose], None, labeler.min_share, progress)[0]
     areas = pose.surface.original.face_areas
-    said = (labels >= 0) & (found >= 0) & (found < taught.n_parts)
-    table = np.zeros((taught.n_parts, taught.n_parts))
-    np.add.at(table, (labels[said], found[said]), areas[said])
-    for part in np.flatnonzero(table.sum(axis=1) > 0):
-        other = int(table[part].argmax())
-        if other != part and table[part, part] < LEAST_FOUND * table[part].sum():
-            raise UnlikePartsError(*sorted((int(part), other)))
+    for left, right in zip(taught.left[taught.sided], taught.right[taught.sided], strict=True):
+        for part, other in ((left, right), (right, left)):
+            right_one, wrong_one = (areas[(labels == part) & (found == one)].sum() for one in (part, other))
+            if right_one < LEAST_FOUND * (right_one + wrong_one):
+                raise UnlikePartsError(int(min(part, other)), int(max(part, other)))
