@@ -126,7 +126,7 @@ textures or rigs on its own."""
 
 UPPER_OF = {"Arm": "Upper Arm", "Leg": "Thigh", "Foreleg": "Upper Foreleg", "Hind Leg": "Upper Hind Leg"}
 """What a bone named as a whole limb is, if the limb goes on below it."""
-JOINTS = {"Shoulder": ("Forearm", "Upper Arm"), "Hips": ("Shin", "Thigh")}
+NAMED_BY_JOINT = {"Shoulder": ("Forearm", "Upper Arm"), "Hips": ("Shin", "Thigh")}
 """What a bone on one side that is named as the joint at its beginning is, if the next part hangs on it."""
 LOWER_OF = {"Arm": "Forearm", "Leg": "Shin", "Foreleg": "Lower Foreleg", "Hind Leg": "Lower Hind Leg"}
 """What a bone named as a whole limb is, if the limb begins above it."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.learning.taught_parts import LEAST_FACES, NOT_SAID, Unlabeled
 from ...core.mesh.triangle_mesh import IntArray
-from ...core.message import Message
+from ...core.message import Message, message_of
 from ...rigs import parts_of_faces, split_side
 from ..errors import UserError
 from ..outputs.taught_parts import BONES, TaughtParts, taught_parts
@@ -45,6 +45,14 @@ class Lesson:
     labels: list[IntArray]
     unlabeled: Unlabeled
     from_bones: bool = False
+
+    def named(self, error: ValueError) -> ValueError:
+        """An error of the core with the name of the part that it is about, instead of its number."""
+        message = message_of(error)
+        if not isinstance(message, Message) or not isinstance(message.values.get("part"), int):
+            return error
+        name = self.names[int(str(message.values["part"]))]
+        return ValueError(Message(message.template, **{**message.values, "part": f'"{name}"'}))
 
     def joined(self, first: int, second: int) -> tuple[Lesson, Message]:
         """The lesson with two parts of the same shape as one, and what to tell about it.
@@ -106,7 +114,7 @@ def read_lesson(settings: WKSSegmentSettings, poses: Sequence[Pose], told: Repor
     if unseen:
         told.warn(
             Message(
-                "Not learned, since the poses show fewer than {least} faces of it: {names}",
+                "Not learned, since the poses show fewer than {least:,} faces of it: {names}",
                 least=LEAST_FACES,
                 names=quoted(unseen),
             )
