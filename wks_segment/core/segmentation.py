@@ -21,8 +21,8 @@ from .learning.likelihood import comparable_score, usual_scores
 from .learning.parameters import Estimator, NSegments, Preset, check_parameters, effective
 from .learning.part_mixture import PartMixture, learn_parts
 from .learning.standardizer import Scaling, Standardizer
-from .learning.taught_mixture import Unlabeled, learn_taught_parts
-from .learning.taught_parts import checked_labels
+from .learning.taught_mixture import learn_taught_parts
+from .learning.taught_parts import TaughtLabels, Unlabeled, UnlikePartsError, checked_labels
 from .learning.training_samples import TrainingSamples
 from .mesh.surface import IslandMode
 from .mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
@@ -205,10 +205,8 @@ class PoseSegmentation(PoseLabeling, Estimator):
         training, step = TrainingSamples.of(poses, parameters), overall.part(0.0, GROUPED)
         atlases = None
         if taught is not None:
-            learned = learn_taught_parts(parameters, poses, taught, unlabeled, training, rest, cache, step)
-            of_labels = self._labeler_of(learned, training.standardizer)
-            step = overall.part(GROUPED, RECOGNIZED)
-            learned, atlases = recognized_taught_parts(of_labels, learned, poses, taught, rest, step)
+            lesson = TaughtLabels(taught, unlabeled)
+            learned, atlases = self._taught(lesson, poses, training, rest, cache, overall.part(0.0, RECOGNIZED))
         else:
             learned = learn_parts(parameters, poses, training, rest, cache, step)
         if taught is None and learned.grouping is not None:
@@ -392,12 +390,37 @@ class PoseSegmentation(PoseLabeling, Estimator):
             learned = replace(learned, grouping=learned.grouping.without(lost[-1], labeler.n_segments))
         return learned, atlases
 
+    def _taught(
+        self, lesson: TaughtLabels, poses: Sequence[Workpiece], training: TrainingSamples, rest: TriangleMesh | None,
+        cache: Cache | None, progress: Progress,
+    ) -> tuple[PartMixture, tuple[RegionAtlas, RegionAtlas]]:  # fmt: skip
+        """Parts that were taught, and their regions; two alike ones that are no left and right are learned apart.
+
+        Raises
+        ------
+        UnlikePartsError
+            If a part is not found again all the same.
+        """
+        while True:
+            step = progress.part(0.0, GROUPED / RECOGNIZED)
+            learned = learn_taught_parts(self.get_params(), poses, lesson, training, rest, cache, step)
+            of_labels = self._labeler_of(learned, training.standardizer)
+            step = progress.part(GROUPED / RECOGNIZED, 1.0)
+            try:
+                return recognized_taught_parts(of_labels, learned, poses, lesson, rest, step)
+            except UnlikePartsError as error:
+                if learned.taught is None or not learned.taught.has_pair(*error.parts):
+                    raise
+                lesson = replace(lesson, apart=lesson.apart | {error.parts})
+
     def _checked_labels(
         self, labels: Sequence[IntArray | None], meshes: Sequence[AnyPose], unlabeled: Unlabeled
     ) -> list[IntArray]:
         """For each mesh the taught part of each face; ValueError if the labels do not fit, or cannot be learned."""
         if self.preset == "paper":
-            raise ValueError('parts are taught with preset="default": with the paper\'s setting each component is a part')
+            raise ValueError(
+                'parts are taught with preset="default": with the paper\'s setting each component is a part'
+            )
         if unlabeled not in get_args(Unlabeled):
             raise ValueError(Message('unlabeled must be "learn" or "ignore", not {value!r}', value=unlabeled))
         originals = [mesh if isinstance(mesh, TriangleMesh) else mesh.surface.original for mesh in meshes]

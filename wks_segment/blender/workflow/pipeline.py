@@ -42,6 +42,11 @@ SEGMENT_SHARE = 0.6
 the progress bar uneven."""
 
 
+TAUGHT_MIN_SHARE = 0.2
+"""How much smaller a region of a taught part may be than *Smallest Part* says: a paw of a fox has 0.5 % of the area,
+and is wanted if it was taught."""
+
+
 @dataclass(frozen=True)
 class LabelRequest:
     """Settings of labels, and the meshes that they are for: all that labeling needs beside poses.
@@ -163,7 +168,7 @@ def label(
             parts = _parts_of(model, views, request, run.progress.part(i / len(groups), (i + 1) / len(groups)))
             labels |= {poses[j].character: parts for j in group}
     run.report.add_labels(np.concatenate(list(labels.values())))
-    if request.sides == "two" and len(run.report.parts) == run.report.n_segments:
+    if request.sides == "two" and model.taught_ is None and len(run.report.parts) == run.report.n_segments:
         run.report.warn(
             "Left and right are not told apart with the method of the paper: both sides are one part"
             if model.sides_ is None
@@ -195,6 +200,8 @@ def _parts_of(model: PoseSegmentation, views: MeshViews, request: LabelRequest, 
     """(p,) part of each polygon of a mesh."""
     two_sides = request.sides == "two"
     min_share = None if model.preset == "paper" else request.min_share
+    if model.taught_ is not None and min_share is not None:
+        min_share *= TAUGHT_MIN_SHARE
     stage = Message('Segments of "{character}"', character=views.name)
     step = progress.part(0.0, SEGMENT_SHARE if two_sides else 1.0, stage)
     step(0.0)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
+from ...core.learning.taught_parts import Unlabeled
 from ...core.mesh.triangle_mesh import IntArray
 from ...core.message import Message
 from ...rigs import parts_of_faces, split_side
@@ -45,7 +46,7 @@ class Lesson:
 
     names: list[str]
     labels: list[IntArray]
-    unlabeled: str
+    unlabeled: Unlabeled
     from_bones: bool = False
 
     def joined(self, first: int, second: int) -> tuple[Lesson, Message]:

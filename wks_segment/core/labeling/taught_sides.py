@@ -36,9 +36,7 @@ def oriented(taught: TaughtParts, labels: IntArray, mesh: TriangleMesh) -> Taugh
     done: list[int] = []
     while open_groups:
         if done:
-            _, g, h = min(
-                (min(_distances(centers, left, right, g, h)), g, h) for g in open_groups for h in done
-            )
+            _, g, h = min((min(_distances(centers, left, right, g, h)), g, h) for g in open_groups for h in done)
             straight, across = _distances(centers, left, right, g, h)
             swap = across < straight
         else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -19,13 +19,15 @@ from .gaussian_mixture import CovarianceType, GaussianMixture
 from .merge_tree import MOST_LIKENESS, MergeTree
 from .parameters import effective, least_segments
 from .part_mixture import PartMixture, fitted_inside, kinds_of, principal_axes
-from .taught_parts import NOT_SAID, TaughtParts, alike_parts
+from .taught_parts import NOT_SAID, TaughtLabels, TaughtParts, alike_parts
 from .training_samples import TrainingSamples
 
-Unlabeled = Literal["learn", "ignore"]
 COMPONENTS_OF_MESH, COMPONENTS_OF_BODIES = 40, 6
 """Number of components for each taught part, from poses of one mesh and from several meshes: with more, other bodies
 are recognized worse (docs/dev/experiments.md)."""
+STRETCH = 0.025
+"""Standard deviation of the logarithm of an edge's length (median over edges) from which meshes with the same faces are
+several bodies: poses of MakeHuman have 0.009, bodies made from it 0.040 and more."""
 LEAST_LEFT = 0.01
 """Share of the area that is not said from which it is cut into parts of its own: less is what was forgotten."""
 
@@ -33,8 +35,7 @@ LEAST_LEFT = 0.01
 def learn_taught_parts(
     parameters: Mapping[str, Any],
     poses: Sequence[Workpiece],
-    labels: Sequence[IntArray],
-    unlabeled: Unlabeled,
+    lesson: TaughtLabels,
     training: TrainingSamples,
     rest: TriangleMesh | None,
     cache: Cache | None,
@@ -48,9 +49,7 @@ def learn_taught_parts(
         Of the model.
     poses
         Of one mesh, with the same faces; otherwise each is another mesh.
-    labels
-        Result of `checked_labels`.
-    unlabeled : "learn" or "ignore"
+    lesson : TaughtLabels
     training : TrainingSamples
         Of the poses.
     rest, cache, progress
@@ -61,21 +60,20 @@ def learn_taught_parts(
     ValueError
         If a part is too small to have a sample, or `rest` has other faces than the first pose.
     """
-    alone = len(poses) == 1 or of_one_mesh([pose.pose for pose in poses])
+    alone = of_one_body(poses)
     meshes = [poses] if alone else [[pose] for pose in poses]
     axes = principal_axes(training)
-    n_parts = 1 + max(int(of_pose.max()) for of_pose in labels)
-    part_of_samples = _of_samples(poses, labels, n_parts, training)
+    n_parts = 1 + max(int(of_pose.max()) for of_pose in lesson.of_faces)
+    part_of_samples = _of_samples(poses, lesson.of_faces, n_parts, training)
     counts = np.bincount(part_of_samples[part_of_samples >= 0], minlength=n_parts)
     if not counts.all():
-        raise ValueError(
-            Message("part {part} is too small to be learned: mark more of it", part=int(counts.argmin()))
-        )
-    taught = TaughtParts.of(n_parts, alike_parts(training.standardized @ axes, part_of_samples, n_parts), not alone)
+        raise ValueError(Message("part {part} is too small to be learned: mark more of it", part=int(counts.argmin())))
+    pairs = alike_parts(training.standardized @ axes, part_of_samples, n_parts, lesson.apart)
+    taught = TaughtParts.of(n_parts, pairs, not alone)
     said = part_of_samples >= 0
     group = np.where(said, taught.group_of_part[part_of_samples], NOT_SAID)
     kinds, n_groups = None, taught.n_groups
-    if unlabeled == "learn" and training.shares[~said].sum() > LEAST_LEFT:
+    if lesson.unlabeled == "learn" and training.shares[~said].sum() > LEAST_LEFT:
         n_segments = least_segments(parameters["n_segments"])
         step = progress.part(0.0, 0.5, "parts")
         kinds = kinds_of(meshes, training.standardizer, axes, n_segments, rest, cache, step)[0]
@@ -92,6 +90,20 @@ def learn_taught_parts(
         chosen, group[group >= 0], axes, per_part * len(np.unique(group[group >= 0])), covariance_type
     )
     return PartMixture(mixture, _tree(mixture, group_of, axes, training, n_groups, taught, kinds), None, taught)
+
+
+def of_one_body(poses: Sequence[Workpiece]) -> bool:
+    """Whether the poses are of one mesh that bends, and not of several bodies, which may have the same faces."""
+    meshes = [pose.surface.original for pose in poses]
+    if len(meshes) == 1 or not of_one_mesh([pose.pose for pose in poses]):
+        return len(meshes) == 1
+    faces = meshes[0].faces
+    logs = []
+    for mesh in meshes:
+        corners = mesh.vertices[faces] / np.sqrt(mesh.area)
+        lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+        logs.append(np.log(np.maximum(lengths.ravel(), np.finfo(float).tiny)))
+    return bool(np.median(np.std(logs, axis=0)) < STRETCH)
 
 
 def _of_samples(

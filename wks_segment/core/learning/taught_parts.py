@@ -6,8 +6,9 @@ the mixture, whose faces are told apart by their side; every other taught part i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -29,6 +30,28 @@ ALIKE = 0.7
 """Two parts are alike if the samples of each are so near to those of the other, in units of the spread inside the part
 (median). On five scans of people and on MakeHuman's body, mirrored parts have 0.02 to 0.63 (once 0.88), neighbors and
 any others 0.89 and more."""
+
+
+Unlabeled = Literal["learn", "ignore"]
+
+
+@dataclass(frozen=True)
+class TaughtLabels:
+    """What `fit` is taught.
+
+    Attributes
+    ----------
+    of_faces : list of (m,) int arrays
+        Result of `checked_labels`.
+    unlabeled : "learn" or "ignore"
+        What becomes of faces of which nothing is said.
+    apart
+        Pairs of parts that are no left and right, whatever their signatures say.
+    """
+
+    of_faces: list[IntArray]
+    unlabeled: Unlabeled
+    apart: frozenset[tuple[int, int]] = frozenset()
 
 
 class UnlikePartsError(ValueError):
@@ -113,6 +136,10 @@ class TaughtParts:
         else:
             wanted = max(1, n_segments - self.n_parts)
         return min(self.n_groups + wanted, len(tree.certainties))
+
+    def has_pair(self, first: int, second: int) -> bool:
+        """Whether two parts are left and right of one group."""
+        return any({first, second} == {left, right} for left, right in zip(self.left, self.right, strict=True))
 
     def parts(self, groups: IntArray, sides: IntArray) -> IntArray:
         """Part of each place, given its group (−1 stays) and side; groups that were not taught are numbered after."""
@@ -204,7 +231,9 @@ def _check_counts(labels: Sequence[IntArray]) -> None:
         )  # fmt: skip
 
 
-def alike_parts(places: FloatArray, part: IntArray, n_parts: int) -> list[tuple[int, int]]:
+def alike_parts(
+    places: FloatArray, part: IntArray, n_parts: int, apart: Collection[tuple[int, int]] = ()
+) -> list[tuple[int, int]]:
     """Pairs of parts that have the same signatures: each part is in one pair at most, with the one it is most like.
 
     Parameters
@@ -214,6 +243,8 @@ def alike_parts(places: FloatArray, part: IntArray, n_parts: int) -> list[tuple[
     part : (n,) int array
         Part of each sample, −1 for none.
     n_parts : int
+    apart
+        Pairs that are none, the lower number first.
 
     Returns
     -------
@@ -231,6 +262,8 @@ def alike_parts(places: FloatArray, part: IntArray, n_parts: int) -> list[tuple[
             if i != j:
                 unlike[i, j] = float(np.median(trees[j].query(samples[i])[0])) / spread[i]
     unlike = np.maximum(unlike, unlike.T)
+    for i, j in apart:
+        unlike[i, j] = unlike[j, i] = np.inf
     pairs = []
     while n_parts > 1:
         i, j = divmod(int(unlike.argmin()), n_parts)

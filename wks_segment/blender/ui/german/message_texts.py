@@ -379,5 +379,8 @@ GERMAN_MESSAGES = {
     "No pose shows a part: are the faces of all parts masked or removed by modifiers?": "Keine Pose zeigt einen Teil: sind die Flächen aller Teile von Modifikatoren maskiert oder entfernt?",
     "Not learned, since the poses show fewer than {least} faces of it: {names}": "Nicht gelernt, da die Posen weniger als {least} Flächen davon zeigen: {names}",
     'There is only one part, "{name}": add another one, or set Other Faces to Find Segments': 'Es gibt nur einen Teil, "{name}": einen weiteren anlegen, oder Andere Flächen auf Segmente finden stellen',
+    '"{left}" and "{right}" are no mirror images of each other, and are learned as one part': '"{left}" und "{right}" sind keine Spiegelbilder voneinander und werden als ein Teil gelernt',
+    '"{one}" and "{other}" have the same shape, and are learned as one part': '"{one}" und "{other}" haben die gleiche Form und werden als ein Teil gelernt',
+    '"{first}" and "{second}" have the same shape, and are not left and right of each other: teach them as one part': '"{first}" und "{second}" haben die gleiche Form und sind nicht links und rechts voneinander: als einen Teil lehren',
 }
 """By English template."""
