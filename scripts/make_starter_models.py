@@ -24,7 +24,7 @@ from benchmarks import makehuman, rigs
 from benchmarks.bodies import other_body
 from wks_segment.core import DiskCache, PartNotes, PoseSegmentation, PoseSignature, connect
 from wks_segment.core.mesh.triangle_mesh import IntArray
-from wks_segment.rigs import BoneTree, Skeleton, Skin, parts_of_faces, usual_rows
+from wks_segment.rigs import BoneTree, Skeleton, Skin, parts_of_faces, split_side, usual_rows
 
 TARGET = Path(__file__).parents[1] / "wks_segment" / "models"
 MOTIONS = ("walk1", "dance1", "zombieWalk1", "benchmark", "tpose")
@@ -35,6 +35,8 @@ ANIMALS = ("Cow", "Fox", "Horse", "Husky", "Stag", "Wolf")
 """Names of the files of four-legged animals (Quaternius, CC0)."""
 ANIMAL_FRAMES = 2
 """Number of poses of each animal."""
+JOINED = {"Ear": "Head"}
+"""Parts that only some of the rigs have, and the part that they belong to."""
 DIGITS = 6
 """Significant digits of the numbers in the files, which are read by people and compared with what the script makes."""
 
@@ -108,8 +110,9 @@ def quadruped_lesson(folder: Path, cache: DiskCache | None = None, rig_cache: Pa
     names: list[str] = []
     for animal in ANIMALS:
         rig = rigs.load(folder / f"{animal}.glb", rig_cache)
-        names += [name for name in rig.part_names if name not in names]
-        number = np.array([*(names.index(name) for name in rig.part_names), -1])
+        of_rig = [JOINED.get(split_side(name)[0], name) for name in rig.part_names]
+        names += [name for name in dict.fromkeys(of_rig) if name not in names]
+        number = np.array([*(names.index(name) for name in of_rig), -1])
         meshes = rig.learned[:: len(rig.learned) // ANIMAL_FRAMES][:ANIMAL_FRAMES]
         connection = connect(*meshes, rest=rig.rest_mesh)
         for mesh in meshes:

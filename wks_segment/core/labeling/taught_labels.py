@@ -20,9 +20,9 @@ from .labeler import Labeler
 from .region_atlas import RegionAtlas
 from .taught_sides import oriented, sides_by_labels
 
-LEAST_FOUND = 0.75
-"""Least share of the area of a left or right part that has its label, and not the other one, on the mesh that it was
-taught on: with less they are not left and right, and nothing else tells them apart. Chance finds a half."""
+LEAST_ON_SIDE, LEAST_FOUND = 0.75, 0.25
+"""Least share of the area of a part that has its label, and not that of another one that is alike, on the mesh that it
+was taught on: of left and right parts, of which chance finds a half, and of parts that are learned apart."""
 
 
 GROUPED_SHARE = 0.7
@@ -69,7 +69,7 @@ def learned_lesson(
         learned = learn(lesson, progress.part(0.0, GROUPED_SHARE))
         step = progress.part(GROUPED_SHARE, 1.0)
         try:
-            return recognized_taught_parts(labeler_of(learned), learned, poses, lesson.of_faces, rest, step)
+            return recognized_taught_parts(labeler_of(learned), learned, poses, lesson, rest, step)
         except UnlikePartsError as error:
             if learned.taught is None or not learned.taught.has_pair(*error.parts):
                 raise
@@ -80,7 +80,7 @@ def recognized_taught_parts(
     labeler: Labeler,
     learned: PartMixture,
     poses: Sequence[Workpiece],
-    labels: Sequence[IntArray],
+    lesson: TaughtLabels,
     rest: TriangleMesh | None,
     progress: Progress,
 ) -> tuple[PartMixture, tuple[RegionAtlas, RegionAtlas]]:
@@ -93,8 +93,7 @@ def recognized_taught_parts(
     learned : PartMixture
     poses
         The learned poses.
-    labels
-        For each pose the taught part of each face, −1 for none.
+    lesson : TaughtLabels
     rest : TriangleMesh or None
         The mesh of the first pose at rest.
     progress : Progress
@@ -105,6 +104,7 @@ def recognized_taught_parts(
         If two taught parts are alike, and not left and right of each other.
     """
     assert learned.taught is not None
+    labels = lesson.of_faces
     # The first pose tells left from right: the one that shows the most parts.
     first = int(np.argmax([len(np.unique(of_mesh)) for of_mesh in labels]))
     same_mesh = np.array_equal(poses[first].surface.original.faces, poses[0].surface.original.faces)
@@ -117,18 +117,28 @@ def recognized_taught_parts(
     region = labeler.learned_regions(atlases[1], in_order)
     side = sides_by_labels(atlases[1].side, region, taught, labels[first], mesh.face_areas)
     wholes, sides = (replace(atlas, side=side) if atlas is atlases[1] else atlas for atlas in atlases)
-    _check_found(replace(labeler, sides_atlas=sides), in_order[0], labels[first], taught, progress.part(0.7, 1.0))
+    labeler, step = replace(labeler, sides_atlas=sides), progress.part(0.7, 1.0)
+    _check_found(labeler, in_order[0], lesson, labels[first], taught, step)
     return replace(learned, taught=taught), (wholes, sides)
 
 
-def _check_found(labeler: Labeler, pose: Workpiece, labels: IntArray, taught: TaughtParts, progress: Progress) -> None:
-    """UnlikePartsError if one of two parts that differ by side has the label of the other where it was taught."""
-    if not len(taught.sided):
+def _check_found(
+    labeler: Labeler,
+    pose: Workpiece,
+    lesson: TaughtLabels,
+    labels: IntArray,
+    taught: TaughtParts,
+    progress: Progress,
+) -> None:
+    """UnlikePartsError if one of two alike parts has the label of the other where it was taught."""
+    if not len(taught.sided) and not lesson.apart:
         return
     found = labeler.segments([pose], None, labeler.min_share, progress)[0]
     areas = pose.surface.original.face_areas
-    for left, right in zip(taught.left[taught.sided], taught.right[taught.sided], strict=True):
-        for part, other in ((left, right), (right, left)):
-            right_one, wrong_one = (areas[(labels == part) & (found == one)].sum() for one in (part, other))
-            if right_one < LEAST_FOUND * (right_one + wrong_one):
-                raise UnlikePartsError(int(min(part, other)), int(max(part, other)))
+    pairs = zip(taught.left[taught.sided].tolist(), taught.right[taught.sided].tolist(), strict=True)
+    least_of_pairs = dict.fromkeys(pairs, LEAST_ON_SIDE) | dict.fromkeys(lesson.apart, LEAST_FOUND)
+    for pair, least in least_of_pairs.items():
+        for part, other in (pair, pair[::-1]):
+            right, wrong = (float(areas[(labels == part) & (found == one)].sum()) for one in (part, other))
+            if right < least * (right + wrong):
+                raise UnlikePartsError(*sorted(pair))

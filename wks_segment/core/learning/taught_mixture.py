@@ -25,6 +25,9 @@ from .training_samples import TrainingSamples
 COMPONENTS_OF_MESH, COMPONENTS_OF_BODIES = 40, 6
 """Number of components for each taught part, from poses of one mesh and from several meshes: with more, other bodies
 are recognized worse (docs/dev/experiments.md)."""
+STRETCH = 0.025
+"""Standard deviation of the logarithm of an edge's length (median over edges) from which meshes with the same faces are
+several bodies: poses of MakeHuman have 0.009, bodies made from it 0.040 and more."""
 LEAST_LEFT = 0.01
 """Share of the area that is not said from which it is cut into parts of its own: less is what was forgotten."""
 
@@ -57,7 +60,7 @@ def learn_taught_parts(
     ValueError
         If a part is too small to have a sample, or `rest` has other faces than the first pose.
     """
-    alone = len(poses) == 1 or of_one_mesh([pose.pose for pose in poses])
+    alone = of_one_body(poses)
     meshes = [poses] if alone else [[pose] for pose in poses]
     axes = principal_axes(training)
     n_parts = 1 + max(int(of_pose.max()) for of_pose in lesson.of_faces)
@@ -87,6 +90,20 @@ def learn_taught_parts(
         chosen, group[group >= 0], axes, per_part * len(np.unique(group[group >= 0])), covariance_type
     )
     return PartMixture(mixture, _tree(mixture, group_of, axes, training, n_groups, taught, kinds), None, taught)
+
+
+def of_one_body(poses: Sequence[Workpiece]) -> bool:
+    """Whether the poses are of one mesh that bends, and not of several bodies, which may have the same faces."""
+    meshes = [pose.surface.original for pose in poses]
+    if len(meshes) == 1 or not of_one_mesh([pose.pose for pose in poses]):
+        return len(meshes) == 1
+    faces = meshes[0].faces
+    logs = []
+    for mesh in meshes:
+        corners = mesh.vertices[faces] / np.sqrt(mesh.area)
+        lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+        logs.append(np.log(np.maximum(lengths.ravel(), np.finfo(float).tiny)))
+    return bool(np.median(np.std(logs, axis=0)) < STRETCH)
 
 
 def _of_samples(

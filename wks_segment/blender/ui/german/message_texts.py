@@ -374,7 +374,6 @@ GERMAN_MESSAGES = {
     "does not fit": "passt nicht",
     "The model has the {count} segments that it was taught": "Das Modell hat die {count} Segmente, die es gelehrt wurde",
     "This copy of the extension has no starter models: install it again": "Dieser Kopie der Erweiterung fehlen die beiliegenden Modelle: erneut installieren",
-    "{names} is like none of the starter models ({models}): learn a model from poses or from your own parts, or add a starter model by the folder button and apply it all the same": "{names} gleicht keinem der beiliegenden Modelle ({models}): ein Modell aus Posen oder aus eigenen Teilen lernen, oder ein beiliegendes Modell mit dem Ordner-Knopf hinzufügen und trotzdem anwenden",
     "the starter models": "den beiliegenden Modellen",
     "No pose shows a part: are the faces of all parts masked or removed by modifiers?": "Keine Pose zeigt einen Teil: sind die Flächen aller Teile von Modifikatoren maskiert oder entfernt?",
     "Not learned, since the poses show fewer than {least:,} faces of it: {names}": "Nicht gelernt, da die Posen weniger als {least:,} Flächen davon zeigen: {names}",
@@ -393,5 +392,6 @@ GERMAN_MESSAGES = {
     "part {part} has {count:,} faces in all labels together, but needs at least {least}: mark more of it": "Teil {part} hat in allen Labels zusammen {count:,} Flächen, braucht aber mindestens {least}: mehr davon markieren",
     "parts {first} and {second} cannot be told apart: they have the same shape, and are not left and right of each other. Teach them as one part": "die Teile {first} und {second} sind nicht zu unterscheiden: sie haben die gleiche Form und sind nicht links und rechts voneinander. Als einen Teil lehren",
     "taught_left and taught_right do not have each part once": "taught_left und taught_right haben nicht jeden Teil einmal",
+    "{names} is unlike all that the starter models ({models}) learned: check the parts, or learn a model from poses or from your own parts": "{names} gleicht nichts, woraus die beiliegenden Modelle ({models}) gelernt wurden: die Teile prüfen, oder ein Modell aus Posen oder aus eigenen Teilen lernen",
 }
 """By English template."""
