@@ -38,8 +38,8 @@ STARTER_FOLDER = Path(__file__).parents[2] / "models"
 """Folder of the models that come with the extension. They are only read: applying one adds a copy to the scene."""
 STARTER_SPREAD = 0.42
 """Spread of the usual scores of these models. They were learned from a few made-up bodies, and real ones differ more:
-ten Princeton humans score up to 1.66 below the learned bodies, other classes 2.2 and more. With this spread, what scores
-1.8 below does not fit any more."""
+ten Princeton humans score up to 1.66 below the learned bodies, other classes 2.2 and more. What scores 1.8 below
+does not fit any more."""
 ROW_STORES = {
     "model": "model",
     "summary": "model_summary",
