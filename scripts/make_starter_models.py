@@ -110,7 +110,9 @@ def quadruped_lesson(folder: Path, cache: DiskCache | None = None, rig_cache: Pa
     names: list[str] = []
     for animal in ANIMALS:
         rig = rigs.load(folder / f"{animal}.glb", rig_cache)
-        of_rig = [JOINED.get(split_side(name)[0], name) for name in rig.part_names]
+        # Left and right are one part: the legs of animals that differ so much do not show which is which.
+        plain = [split_side(name)[0] for name in rig.part_names]
+        of_rig = [JOINED.get(name, name) for name in plain]
         names += [name for name in dict.fromkeys(of_rig) if name not in names]
         number = np.array([*(names.index(name) for name in of_rig), -1])
         meshes = rig.learned[:: len(rig.learned) // ANIMAL_FRAMES][:ANIMAL_FRAMES]

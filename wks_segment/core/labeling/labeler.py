@@ -27,7 +27,7 @@ from .own_parts import OwnParts, own_parts
 from .polygons import Cleaning, PolygonMesh
 from .region_atlas import RegionAtlas
 from .sides import side_field, sides_of_regions
-from .taught_sides import halves
+from .taught_sides import consistent, halves
 from .traits import FIELDS, Regions, Traits, mean_traits
 
 LABELS_SHARE = 0.7
@@ -211,7 +211,10 @@ class Labeler:
         done = 0
         for together, step in _steps([poses[i] for i in voters], progress):
             regions = self._regions(atlas.n_groups, together, self.min_share, step.part(0.0, LABELS_SHARE))
-            numbers = atlas.numbers_of(mean_traits([self._traits(regions, pose, len(together)) for pose in together]))
+            found = mean_traits([self._traits(regions, pose, len(together)) for pose in together])
+            numbers = atlas.numbers_of(found)
+            if self.taught is not None:
+                numbers = consistent(numbers, found, atlas.traits, atlas.side, atlas.noise)
             side_of_face = atlas.sides_of(regions.numbered(numbers, len(atlas.side)))
             for pose, _ in step.part(LABELS_SHARE, 1.0).each(together):
                 yield voters[done], _side_field(pose, regions, atlas, side_of_face)
@@ -223,20 +226,22 @@ class Labeler:
         first = poses[0].surface.original
         if rest is not None and not np.array_equal(rest.faces, first.faces):
             raise ValueError("rest has other faces than the first pose: pass the same mesh, in its rest position")
-        of_meshes: list[Regions] = []
+        regions, traits = self.regions_of(n_groups, poses, progress)
+        centers = regions[0].centers(first if rest is None else rest)
+        return RegionAtlas.learned(n_groups, traits, centers, alike=all(one is regions[0] for one in regions))
+
+    def regions_of(
+        self, n_groups: int, poses: Sequence[Workpiece], progress: Progress
+    ) -> tuple[list[Regions], list[Traits]]:
+        """Connected regions of groups on each pose, which are the same object for poses of one mesh, and their traits."""
+        of_poses: list[Regions] = []
         traits: list[Traits] = []
         for together, step in _steps(poses, progress):
             regions = self._regions(n_groups, together, self.min_share, step.part(0.0, LABELS_SHARE))
-            of_meshes.append(regions)
             for pose, _ in step.part(LABELS_SHARE, 1.0).each(together):
+                of_poses.append(regions)
                 traits.append(self._traits(regions, pose, len(together)))
-        centers = of_meshes[0].centers(first if rest is None else rest)
-        return RegionAtlas.learned(n_groups, traits, centers, alike=len(of_meshes) == 1)
-
-    def learned_regions(self, atlas: RegionAtlas, poses: Sequence[Workpiece]) -> IntArray:
-        """(m,) region of each face of the first of the learned poses, which an atlas was learned from."""
-        together = _steps(poses, Progress())[0][0]
-        return self._regions(atlas.n_groups, together, self.min_share, Progress()).region
+        return of_poses, traits
 
     def _regions(self, n_groups: int, poses: Sequence[Workpiece], min_share: float, progress: Progress) -> Regions:
         """Connected regions of groups on a mesh, found in several poses of it together."""

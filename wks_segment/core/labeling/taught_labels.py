@@ -18,7 +18,8 @@ from ..poses.pose_cache import AnyPose, Workpiece
 from ..progress import Progress
 from .labeler import Labeler
 from .region_atlas import RegionAtlas
-from .taught_sides import oriented, sides_by_labels
+from .taught_sides import UNKNOWN_SIDE, oriented, sides_by_labels
+from .traits import Traits
 
 LEAST_ON_SIDE, LEAST_FOUND = 0.75, 0.25
 """Least share of the area of a part that has its label, and not that of another one that is alike, on the mesh that it
@@ -109,17 +110,57 @@ def recognized_taught_parts(
     first = int(np.argmax([len(np.unique(of_mesh)) for of_mesh in labels]))
     same_mesh = np.array_equal(poses[first].surface.original.faces, poses[0].surface.original.faces)
     at_rest = rest if rest is not None and same_mesh else None
-    in_order = [poses[first], *poses[:first], *poses[first + 1 :]]
+    in_order, labels_in_order = (
+        [of_poses[first], *of_poses[:first], *of_poses[first + 1 :]] for of_poses in (poses, labels)
+    )
     mesh = in_order[0].surface.original
     taught = oriented(learned.taught, labels[first], mesh if at_rest is None else at_rest)
     labeler = replace(labeler, taught=taught)
-    atlases = labeler.atlases(in_order, at_rest, progress.part(0.0, 0.7))
-    region = labeler.learned_regions(atlases[1], in_order)
-    side = sides_by_labels(atlases[1].side, region, taught, labels[first], mesh.face_areas)
-    wholes, sides = (replace(atlas, side=side) if atlas is atlases[1] else atlas for atlas in atlases)
-    labeler, step = replace(labeler, sides_atlas=sides), progress.part(0.7, 1.0)
-    _check_found(labeler, in_order[0], lesson, labels[first], taught, step)
-    return replace(learned, taught=taught), (wholes, sides)
+    atlas = _atlas(labeler, in_order, labels_in_order, at_rest, taught, progress.part(0.0, 0.7))
+    labeler = replace(labeler, sides_atlas=atlas)
+    _check_found(labeler, in_order[0], lesson, labels[first], taught, progress.part(0.7, 1.0))
+    return replace(learned, taught=taught), (atlas, atlas)
+
+
+def _atlas(
+    labeler: Labeler,
+    poses: Sequence[Workpiece],
+    labels: Sequence[IntArray],
+    rest: TriangleMesh | None,
+    taught: TaughtParts,
+    progress: Progress,
+) -> RegionAtlas:
+    """Atlas of the regions of taught parts: where labels say left and right, regions need not be matched."""
+    first = poses[0].surface.original
+    regions, traits = labeler.regions_of(labeler.n_segments, poses, progress)
+    centers = regions[0].centers(first if rest is None else rest)
+    sides = [
+        sides_by_labels(one.region, len(one.segment), taught, of_mesh, pose.surface.original.face_areas)
+        for one, of_mesh, pose in zip(regions, labels, poses, strict=True)
+    ]
+    alike = all(one is regions[0] for one in regions)
+    numbers = [_numbers(traits[0], sides[0], *one) for one in zip(traits, sides, strict=True)]
+    atlas = RegionAtlas.learned(labeler.n_segments, traits, centers, alike, [] if alike else numbers)
+    return replace(atlas, side=np.where(sides[0] == UNKNOWN_SIDE, atlas.side, sides[0]))
+
+
+def _numbers(known: Traits, known_side: IntArray, found: Traits, side: IntArray) -> IntArray | None:
+    """(r,) number of each found region: of the known one with its segment and side; None if sides are not known.
+
+    Of several regions with one segment and side the largest ones are the same.
+    """
+    sided = np.isin(found.segment, known.segment[known_side != UNKNOWN_SIDE])
+    if (sided & (side == UNKNOWN_SIDE)).any() or not sided.any():
+        return None
+    places: dict[tuple[int, int], list[int]] = {}
+    for i in np.argsort(-known.area, kind="stable").tolist():
+        places.setdefault((int(known.segment[i]), int(known_side[i])), []).append(i)
+    numbers, new = np.empty(len(side), dtype=np.int64), len(known.segment)
+    for i in np.argsort(-found.area, kind="stable").tolist():
+        same = places.get((int(found.segment[i]), int(side[i])), [])
+        numbers[i] = same.pop(0) if same else new
+        new += int(numbers[i] == new)
+    return numbers
 
 
 def _check_found(

@@ -19,7 +19,7 @@ from .gaussian_mixture import CovarianceType, GaussianMixture
 from .merge_tree import MOST_LIKENESS, MergeTree
 from .parameters import effective, least_segments
 from .part_mixture import PartMixture, fitted_inside, kinds_of, principal_axes
-from .taught_parts import NOT_SAID, TaughtLabels, TaughtParts, alike_parts
+from .taught_parts import NOT_SAID, TaughtLabels, TaughtParts, alike_parts, with_like_neighbors
 from .training_samples import TrainingSamples
 
 COMPONENTS_OF_MESH, COMPONENTS_OF_BODIES = 40, 6
@@ -69,6 +69,7 @@ def learn_taught_parts(
     if not counts.all():
         raise ValueError(Message("part {part} is too small to be learned: mark more of it", part=int(counts.argmin())))
     pairs = alike_parts(training.standardized @ axes, part_of_samples, n_parts, lesson.apart)
+    pairs = with_like_neighbors(pairs, _touching(poses, lesson.of_faces, n_parts))
     taught = TaughtParts.of(n_parts, pairs, not alone)
     said = part_of_samples >= 0
     group = np.where(said, taught.group_of_part[part_of_samples], NOT_SAID)
@@ -104,6 +105,16 @@ def of_one_body(poses: Sequence[Workpiece]) -> bool:
         lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
         logs.append(np.log(np.maximum(lengths.ravel(), np.finfo(float).tiny)))
     return bool(np.median(np.std(logs, axis=0)) < STRETCH)
+
+
+def _touching(poses: Sequence[Workpiece], labels: Sequence[IntArray], n_parts: int) -> FloatArray:
+    """(parts, parts) length of the borders between taught parts on all poses."""
+    table = np.zeros((n_parts, n_parts))
+    for pose, part in zip(poses, labels, strict=True):
+        first, second = part[pose.neighbors.pairs].T
+        border = (first >= 0) & (second >= 0) & (first != second)
+        np.add.at(table, (first[border], second[border]), pose.neighbors.lengths[border])
+    return table + table.T
 
 
 def _of_samples(

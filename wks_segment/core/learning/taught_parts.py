@@ -30,7 +30,8 @@ ALIKE = 0.7
 """Two parts are alike if the samples of each are so near to those of the other, in units of the spread inside the part
 (median). On five scans of people and on MakeHuman's body, mirrored parts have 0.02 to 0.63 (once 0.88), neighbors and
 any others 0.89 and more."""
-
+LEAST_COMMON = 0.5
+"""Share of the borders of two mirrored parts that is with the same parts: 1 but for borders at rest on one side only."""
 
 Unlabeled = Literal["learn", "ignore"]
 
@@ -272,3 +273,29 @@ def alike_parts(
         pairs.append((min(i, j), max(i, j)))
         unlike[[i, j]] = unlike[:, [i, j]] = np.inf
     return sorted(pairs)
+
+
+def with_like_neighbors(pairs: Sequence[tuple[int, int]], touching: FloatArray) -> list[tuple[int, int]]:
+    """The pairs whose parts touch the same others, left and right counting as one: a head and a tail do not.
+
+    Parameters
+    ----------
+    pairs
+        Result of `alike_parts`.
+    touching : (parts, parts) array
+        Length of the borders between parts on all meshes.
+    """
+    kept: list[tuple[int, int]] = []
+    one_of_pair = np.arange(len(touching))
+    for first, second in pairs:
+        one_of_pair[second] = first
+    own = np.eye(len(touching))[one_of_pair]
+    shares = touching @ own
+    for first, second in pairs:
+        profiles = np.delete(shares[[first, second]], first, axis=1)
+        total = profiles.sum(axis=1)
+        # Strokes touch nothing, and say nothing about it.
+        common = np.minimum(*(profiles / np.where(total > 0, total, 1.0)[:, None])).sum()
+        if not total.all() or common > LEAST_COMMON:
+            kept.append((first, second))
+    return kept
