@@ -80,7 +80,8 @@ def test_the_tree_is_shown_once_bones_are_listed(settings):
         teach_panel.WKS_SEGMENT_UL_bones.draw_item(None, bpy.context, layout, settings, item, 0, settings)
         rows.append((layout.names, [text for text in layout.texts if text]))
     assert rows[0][0][0] == "open", "the first row has rows below it"
-    assert rows[1][0][0] == "label"
+    assert "own" not in rows[0][0], "the first row is always a part"
+    assert rows[1][0][:2] == ["label", "own"]
     assert [texts[0] for _, texts in rows] == ["Torso", "Limb"]
     assert [texts[1].endswith(" %") for _, texts in rows] == [True, True]
 
