@@ -26,8 +26,8 @@ from .learned_areas import with_learned_areas
 from .own_parts import OwnParts, own_parts
 from .polygons import Cleaning, PolygonMesh
 from .region_atlas import RegionAtlas
-from .sides import side_field, sides_of_regions
-from .taught_sides import consistent, halves
+from .sides import have_counterpart, side_field, sides_of_regions
+from .taught_sides import halves
 from .traits import FIELDS, Regions, Traits, mean_traits
 
 LABELS_SHARE = 0.7
@@ -213,9 +213,11 @@ class Labeler:
             regions = self._regions(atlas.n_groups, together, self.min_share, step.part(0.0, LABELS_SHARE))
             found = mean_traits([self._traits(regions, pose, len(together)) for pose in together])
             numbers = atlas.numbers_of(found)
+            side = atlas.sides_of(numbers)
             if self.taught is not None:
-                numbers = consistent(numbers, found, atlas.traits, atlas.side, atlas.noise)
-            side_of_face = atlas.sides_of(regions.numbered(numbers, len(atlas.side)))
+                # Thighs can be one region in one pose and two in another, of which one would be matched with a crumb.
+                side = np.where(have_counterpart(found.area, side, found.segment), side, 0)
+            side_of_face = np.append(side, 0)[np.minimum(regions.region, len(side))]
             for pose, _ in step.part(LABELS_SHARE, 1.0).each(together):
                 yield voters[done], _side_field(pose, regions, atlas, side_of_face)
                 done += 1

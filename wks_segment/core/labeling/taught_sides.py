@@ -10,7 +10,6 @@ from ..learning.taught_parts import TaughtParts
 from ..mesh.adjacency import FaceAdjacency, connected_regions
 from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
 from .sides import CLEAR_SIDE
-from .traits import Traits
 
 UNKNOWN_SIDE = 2
 """Stands for the side of a region that shows neither a left nor a right part."""
@@ -81,58 +80,6 @@ def sides_by_labels(region: IntArray, count: int, taught: TaughtParts, labels: I
     mean = total / np.where(weight > 0, weight, 1.0)
     clear = np.where(np.abs(mean) > CLEAR_SIDE, np.sign(mean), 0)
     return np.where(weight > 0, clear, UNKNOWN_SIDE).astype(np.int64)
-
-
-def consistent(numbers: IntArray, found: Traits, known: Traits, side: IntArray, noise: FloatArray) -> IntArray:
-    """(r',) numbers of found regions, with left and right exchanged where all regions together are then more alike.
-
-    A single region of another body has a weak handedness: one that is matched with the wrong side draws others after
-    it. So segments are exchanged one by one, from the numbers as they are and from all exchanged, and the better result
-    is taken.
-
-    Parameters
-    ----------
-    numbers : (r',) int array
-        Known region of each found one; r and more for none.
-    found, known : Traits
-    side : (r,) int array
-        Of the known regions.
-    noise : (4,) array
-        Standard deviations of log area, signature, handedness and distance.
-    """
-    partner = np.arange(len(side))
-    for i in np.flatnonzero(side):
-        others = np.flatnonzero((known.segment == known.segment[i]) & (side == -side[i]))
-        if len(others):
-            partner[i] = others[np.abs(np.log(known.area[others] / known.area[i])).argmin()]
-    matched = np.flatnonzero(numbers < len(side))
-    segments = [s for s in np.unique(found.segment[matched]).tolist() if (side[known.segment == s] != 0).any()]
-    weight = found.area[matched] / found.area[matched].sum()
-    distance = found.distance[np.ix_(matched, matched)]
-
-    def with_exchanged(exchanged: frozenset[int]) -> IntArray:
-        at = numbers[matched]
-        return np.where(np.isin(found.segment[matched], list(exchanged)), partner[at], at)
-
-    def cost(exchanged: frozenset[int]) -> float:
-        at = with_exchanged(exchanged)
-        hands = ((found.handedness[matched] - known.handedness[at]) / noise[2]) ** 2
-        apart = ((distance - known.distance[np.ix_(at, at)]) / noise[3]) ** 2 @ weight
-        return float(hands.sum() + np.sqrt(len(matched)) * apart.sum())
-
-    best = frozenset[int]()
-    for start in (best, frozenset(segments)):
-        now, lowest = start, cost(start)
-        while segments:
-            options = {now ^ {s}: cost(now ^ {s}) for s in segments}
-            option = min(options, key=options.__getitem__)
-            if not options[option] < lowest:
-                break
-            now, lowest = option, options[option]
-        best = now if lowest < cost(best) else best
-    result = numbers.copy()
-    result[matched] = with_exchanged(best)
-    return result
 
 
 def halves(field: FloatArray, labels: IntArray, neighbors: FaceAdjacency, areas: FloatArray) -> IntArray:
