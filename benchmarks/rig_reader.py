@@ -18,10 +18,13 @@ import bpy
 import numpy as np
 
 from benchmarks.rig_bones import Bones, truth
+from wks_segment.blender.errors import UserError
+from wks_segment.blender.scene.bone_weights import bone_tree_of
 from wks_segment.blender.scene.characters import Character, armature_of, group, mesh_objects, polygon_ranges
 from wks_segment.blender.scene.file_formats import open_files
 from wks_segment.blender.scene.poses import Pose, in_one_triangulation, read_pose
 from wks_segment.core.mesh.triangle_mesh import IntArray
+from wks_segment.rigs import parts_of_faces, usual_rows
 
 LEARNED, UNSEEN = 5, 3
 LARGEST_TURN = 0.35
@@ -61,7 +64,9 @@ def read(path: Path) -> dict[str, Any]:
     known = rest.polygon_of >= 0
     bones, of_polygons = bones_of_polygons(scene.character)
     bone, names = truth(bones, of_polygons[rest.polygon_of[known]], rest.mesh.face_areas[known])
+    part, part_names = named_parts(scene.character)
     return {
+        "part": part[rest.polygon_of[known]], "part_names": np.array(part_names),
         "vertices": np.stack([pose.mesh.vertices for pose in poses]), "rest": rest.mesh.vertices,
         "faces": rest.mesh.faces[known], "polygon": rest.polygon_of[known], "bone": bone,
         "bone_names": np.array(names), "action": np.array(action),
@@ -172,6 +177,17 @@ def bones_of_polygons(character: Character) -> tuple[Bones, IntArray]:
     bones = Bones.of(parent_of)
     index = {name: i for i, name in enumerate(bones.names)}
     return bones, np.array([index[name] for names in chosen for name in names], dtype=np.int64)
+
+
+def named_parts(character: Character) -> tuple[IntArray, list[str]]:
+    """The usual named part of each polygon of a character, −1 for none, and the names; no part without usable bones."""
+    try:
+        tree = bone_tree_of(character)
+    except UserError:
+        return np.full(polygon_ranges(character)[-1][1].stop, -1), []
+    own, names = usual_rows(tree.rows)
+    found = parts_of_faces([tree], [own], names=[names])
+    return found.labels[0], [part.full_name for part in found.parts]
 
 
 def _name_of_object(obj: bpy.types.Object, parent_of: dict[str, str | None]) -> str:

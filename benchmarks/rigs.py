@@ -34,7 +34,7 @@ from wks_segment.core.mesh.triangle_mesh import FloatArray, IntArray, repeats_a_
 
 FILES = (".glb", ".gltf", ".fbx", ".blend", ".usdz", ".usdc", ".usda", ".usd")
 CACHE = Path("demo/rigs/cache")
-VERSION = 1
+VERSION = 2
 """Of the cached arrays; counted up when what is read changes."""
 LEARNED = (0, 2, 4, 5, 7)
 """Frames that are learned, evenly among the eight as `wks_segment demo` chooses them; the others are unseen."""
@@ -67,6 +67,9 @@ class Rig:
     bone_names : list of str
     action : str
         What the frames are from.
+    part : (m,) int array
+        The named part of each face by the bones of its rig, −1 for none.
+    part_names : list of str
     """
 
     name: str
@@ -77,6 +80,8 @@ class Rig:
     bone: IntArray
     bone_names: list[str]
     action: str
+    part: IntArray
+    part_names: list[str]
 
     @property
     def rest_mesh(self) -> TriangleMesh:
@@ -117,6 +122,7 @@ def load(path: Path, cache: Path = CACHE) -> Rig:
         return Rig(
             path.stem, arrays["vertices"], arrays["rest"], arrays["faces"], arrays["polygon"], arrays["bone"],
             [str(name) for name in arrays["bone_names"]], str(arrays["action"]),
+            arrays["part"], [str(name) for name in arrays["part_names"]],
         )  # fmt: skip
 
 

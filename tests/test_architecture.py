@@ -102,6 +102,13 @@ def test_core_uses_neither_blender_nor_other_packages_of_ours():
             assert target[0] != "wks_segment" or target[1] == "core", f"{path}:{line}"
 
 
+def test_rigs_use_core_only():
+    for path in sorted((PACKAGE / "rigs").rglob("*.py")):
+        for target, line in imports(path):
+            assert target[0] not in BLENDERS_OWN, f"{path}:{line}"
+            assert target[0] != "wks_segment" or target[1] in ("core", "rigs"), f"{path}:{line}"
+
+
 def test_batch_uses_core_only():
     """What it runs is a command line."""
     for path in sorted((PACKAGE / "batch").rglob("*.py")):

@@ -69,6 +69,18 @@ def learned_once():
         yield once
 
 
+@pytest.fixture(autouse=True)
+def starter_folder(tmp_path_factory, monkeypatch):
+    """An empty folder in the place of the one with the models that come with the extension."""
+    if not HAS_BPY:
+        return None
+    from wks_segment.blender.workflow import model_library
+
+    folder = tmp_path_factory.mktemp("starters")
+    monkeypatch.setattr(model_library, "STARTER_FOLDER", folder)
+    return folder
+
+
 @pytest.fixture
 def learns_anew(learned_once):
     """For a test of what happens while a model is learned."""

@@ -80,8 +80,9 @@ class LearnedOnce:
     def fit(self, model, *arguments, **options):
         given = SIGNATURE.bind(model, *arguments, **options)
         given.apply_defaults()
-        _, meshes, progress, rest, cache = given.args
-        if self.anew or not all(hasattr(mesh, "signature") or hasattr(mesh, "pose") for mesh in meshes):
+        _, meshes, progress, rest, cache, *taught = given.args
+        described = all(hasattr(mesh, "signature") or hasattr(mesh, "pose") for mesh in meshes)
+        if self.anew or not described or any(each is not None for each in taught[:1]):
             return FIT(*given.args)
         parameters = inspect.signature(type(model)).parameters
         key = key_of({name: getattr(model, name) for name in parameters}, meshes, rest, cache is not None)

@@ -19,6 +19,7 @@ from .operators.learn import WKS_SEGMENT_OT_learn
 from .operators.load_model import WKS_SEGMENT_OT_load_model
 from .operators.merge_segments import WKS_SEGMENT_OT_merge_segments
 from .operators.model_list import WKS_SEGMENT_OT_duplicate_model, WKS_SEGMENT_OT_remove_model, WKS_SEGMENT_OT_use_model
+from .operators.name_parts import WKS_SEGMENT_OT_name_parts
 from .operators.name_segment import WKS_SEGMENT_OT_name_segment
 from .operators.rank import WKS_SEGMENT_OT_rank
 from .operators.restore_segments import WKS_SEGMENT_OT_refresh_segments, WKS_SEGMENT_OT_restore_segments
@@ -33,15 +34,17 @@ from .operators.show_segments import (
     WKS_SEGMENT_OT_show_segments,
 )
 from .operators.split_segment import WKS_SEGMENT_OT_split_segment
+from .operators.teach import WKS_SEGMENT_OT_list_bones, WKS_SEGMENT_OT_teach
 from .operators.transfer import WKS_SEGMENT_OT_transfer
 from .operators.unwrap import WKS_SEGMENT_OT_unwrap
 from .operators.update import WKS_SEGMENT_OT_update
 from .props import changes, preferences, presets
+from .props.bone_item import WKSBoneItem
 from .props.label_set import WKSLabelSet
 from .props.model_item import WKSModelItem, WKSRankItem
 from .props.segment_item import WKSSegmentItem
 from .props.settings import WKSSegmentSettings
-from .ui import main_panel, menu, models_panel, segments_panel
+from .ui import main_panel, menu, models_panel, segments_panel, teach_panel
 from .ui.color_icons import COLOR_ICONS, ColorIcons
 from .ui.preview import ViewportPreview
 from .ui.translations import TRANSLATIONS
@@ -53,6 +56,9 @@ from .workflow.property_changes import PropertyChanges
 
 OPERATORS = (
     WKS_SEGMENT_OT_learn,
+    WKS_SEGMENT_OT_name_parts,
+    WKS_SEGMENT_OT_teach,
+    WKS_SEGMENT_OT_list_bones,
     WKS_SEGMENT_OT_apply,
     WKS_SEGMENT_OT_cancel,
     WKS_SEGMENT_OT_update,
@@ -91,6 +97,7 @@ CLASSES = (
     WKSModelItem,
     WKSLabelSet,
     WKSRankItem,
+    WKSBoneItem,
     WKSSegmentSettings,
     *OPERATORS,
     *menu.CLASSES,
@@ -98,6 +105,7 @@ CLASSES = (
     # Blender shows sub-panels in the order of their registration.
     main_panel.CLASSES[0],
     *segments_panel.CLASSES,
+    *teach_panel.CLASSES,
     *models_panel.CLASSES,
     *main_panel.CLASSES[1:],
 )

@@ -31,6 +31,8 @@ from .learning.merge_tree import MOST_SEGMENTS, MergeTree
 from .learning.parameters import PARAMETERS, check_parameters, effective
 from .learning.part_mixture import PartMixture
 from .learning.standardizer import LEAST_SPREAD, Standardizer
+from .learning.taught_parts import MOST_PARTS as MOST_TAUGHT
+from .learning.taught_parts import TaughtParts
 from .mesh.triangle_mesh import FloatArray, IntArray
 from .message import Message, message_of
 from .parts.kind_traits import KindTraits
@@ -39,6 +41,8 @@ from .user_labels import PartNotes
 FORMAT = "wks_segment model"
 MODEL_VERSION = 5
 """To be raised whenever older programs would misread a new file, or this program an old one."""
+TAUGHT_VERSION = 6
+"""Version of models of taught parts: programs that know none would number them wrongly."""
 UNIONS_VERSION = 4
 """Version of models whose segments are unions of components by signature alone. They are read, and label as before."""
 MOST_CUT, BEST_WITHIN = 10.0, 0.06
@@ -111,11 +115,15 @@ def encode(model: ModelContent) -> str:
             arrays["areas"] = grouping.areas
     if traits is not None:
         arrays |= {f"kind_{name}": array for name, array in vars(traits).items()}
+    taught = model.learned.taught
+    if taught is not None:
+        arrays |= {f"taught_{name}": np.array(value) for name, value in vars(taught).items()}
+        arrays["taught_of_bodies"] = arrays["taught_of_bodies"].astype(np.int64)
     for kind, atlas in zip(REGION_KINDS, model.atlases or (), strict=False):
         arrays |= atlas.arrays(kind)
     content = {
         "format": FORMAT,
-        "version": MODEL_VERSION,
+        "version": MODEL_VERSION if taught is None else TAUGHT_VERSION,
         "parameters": {name: model.parameters[name] for name in PARAMETERS},
         "mixture_covariance_type": mixture.covariance_type,
         "digest": _digest(model.parameters, mixture.covariance_type, arrays),
@@ -164,9 +172,10 @@ def _decoded(content: dict[str, Any]) -> ModelContent:
         part_notes = PartNotes.of_json(content)
     except ValueError as error:
         raise DamagedError(message_of(error)) from error
-    grouping, traits, atlases = None, None, None
+    grouping, traits, taught, atlases = None, None, None, None
     if grouped:
         grouping = _grouping(arrays)
+        taught = _taught(arrays)
         if "kind_mean" in arrays:
             traits = KindTraits(*(arrays[f"kind_{name}"] for name in KindTraits.__dataclass_fields__))
         wholes, segments = (RegionAtlas.of_arrays(arrays, kind) for kind in REGION_KINDS)
@@ -177,6 +186,7 @@ def _decoded(content: dict[str, Any]) -> ModelContent:
             GaussianMixture(covariance_type, arrays["weights"], arrays["means"], arrays["covariances"]),
             grouping,
             traits,
+            taught,
         ),
         Standardizer(effective(parameters, "scaling"), arrays["centre"], arrays["spread"]),
         atlases,
@@ -197,6 +207,17 @@ def _grouping(arrays: dict[str, FloatArray]) -> MergeTree:
     curve = tree.curve()[1:MOST_SEGMENTS]
     natural = 2 + int(np.flatnonzero(curve >= curve.max() - BEST_WITHIN)[-1]) if len(curve) else 1
     return replace(tree, natural=natural)
+
+
+def _taught(arrays: dict[str, FloatArray]) -> TaughtParts | None:
+    """The taught parts in the arrays of a model file, each of which must be one group, or one side of one."""
+    if "taught_left" not in arrays:
+        return None
+    left, right = (arrays[f"taught_{name}"].astype(np.int64) for name in ("left", "right"))
+    parts = np.append(left, right[left != right])
+    if len(left) > int(arrays["n_kinds"]) or not np.array_equal(np.sort(parts), np.arange(len(parts))):
+        raise DamagedError("taught_left and taught_right do not have each part once")
+    return TaughtParts(left, right, bool(arrays["taught_of_bodies"]))
 
 
 def _fields(
@@ -238,6 +259,13 @@ def _fields(
                 Field("kind_spread", (n_kinds,), least=LEAST_SPREAD),
                 Field("kind_touching", (n_kinds, n_kinds), least=POSITIVE, most=BELOW_ONE),
             )
+    if content["version"] == TAUGHT_VERSION:
+        g = length(content, "taught_left", MOST_TAUGHT)
+        yield from (
+            Field("taught_left", (g,), 0, MOST_TAUGHT - 1, whole=True),
+            Field("taught_right", (g,), 0, MOST_TAUGHT - 1, whole=True),
+            Field("taught_of_bodies", (), 0, 1, whole=True),
+        )
     for kind in REGION_KINDS:
         r = length(content, f"{kind}_segment", MOST_REGIONS)
         yield from (
@@ -264,7 +292,7 @@ def _content(text: str) -> dict[str, Any]:
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise ModelFileError("this is not a model of WKS Segment")
     version = content.get("version")
-    if version not in (UNIONS_VERSION, MODEL_VERSION):
+    if version not in (UNIONS_VERSION, MODEL_VERSION, TAUGHT_VERSION):
         if isinstance(version, int) and version < MODEL_VERSION:
             template = "the model has version {version}, this program reads {known}: learn it again"
         else:

@@ -9,20 +9,24 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from copy import copy
 from dataclasses import replace
+from functools import partial
 from os import PathLike
 from typing import Any, Literal
 
 from . import model_file
 from .labeling.pose_labeling import PoseLabeling
 from .labeling.region_atlas import RegionAtlas
+from .labeling.taught_labels import learned_lesson, lesson_of
 from .learning.gaussian_mixture import CovarianceType
 from .learning.likelihood import comparable_score, usual_scores
 from .learning.parameters import Estimator, NSegments, Preset, check_parameters, effective
 from .learning.part_mixture import PartMixture, learn_parts
 from .learning.standardizer import Scaling, Standardizer
+from .learning.taught_mixture import learn_taught_parts
+from .learning.taught_parts import Unlabeled
 from .learning.training_samples import TrainingSamples
 from .mesh.surface import IslandMode
-from .mesh.triangle_mesh import FloatArray, TriangleMesh
+from .mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
 from .message import Message
 from .poses.arguments import as_list
 from .poses.pose_cache import AnyPose, Workpiece
@@ -98,6 +102,8 @@ class PoseSegmentation(PoseLabeling, Estimator):
     kind_traits_ : KindTraits or None
         Sizes of the parts of each kind, and which kinds touch, if several meshes were learned: a mesh is then cut by
         its own shape, and each of its parts gets one kind. Otherwise None.
+    taught_ : TaughtParts or None
+        Which segments are taught parts, if `fit` was given labels: the first `taught_.n_parts` ones.
     regions_ : RegionAtlas or None
         Connected regions of the learned poses; None with the paper's setting.
     sides_ : RegionAtlas or None
@@ -147,8 +153,10 @@ class PoseSegmentation(PoseLabeling, Estimator):
         progress: ReportFunction | Progress | None = None,
         rest: TriangleMesh | None = None,
         cache: Cache | None = None,
+        labels: Sequence[IntArray | None] | None = None,
+        unlabeled: Unlabeled = "learn",
     ) -> PoseSegmentation:
-        """Learn the segments from one or more poses together.
+        """Learn the segments from one or more poses together, or the parts that labels say.
 
         Parameters
         ----------
@@ -165,12 +173,24 @@ class PoseSegmentation(PoseLabeling, Estimator):
             Searched for signatures, creases and kinds of parts; new ones are added to it. A fit to the same poses with
             another number of segments then takes a fraction of the time, as long as the number of regions of the mesh
             (see `with_segments`) is the same. The result is exactly the same as without a cache.
+        labels, optional
+            To teach parts: for each mesh an (m,) array of the part of each face, 0, 1, … without gaps, and -1 where
+            nothing is said; or None for a mesh of which nothing is said. A few faces of each part are enough. The
+            segments of the model then have these numbers. Two parts that are left and right of each other are told
+            apart by their side, two parts that are taught as one are one.
+        unlabeled : "learn" or "ignore"
+            What becomes of faces of which nothing is said. "learn": they are cut into segments as usual, which are
+            numbered after the taught parts, and all together are `n_segments`, if that is more than the taught ones.
+            "ignore": they have no say, and every face of a mesh is given to a taught part.
 
         Raises
         ------
         ValueError
             If there is no pose, a parameter is out of range, there are fewer vertices than segments, or `rest` has
-            other faces than the first pose.
+            other faces than the first pose; if labels do not fit their mesh, have gaps, or a part of fewer than three
+            faces; with the paper's setting and labels.
+        UnlikePartsError
+            If two taught parts cannot be told apart (a ValueError).
         SpectrumError, MemoryError
             If the eigenpairs of a pose could not be computed; see `describe`.
         """
@@ -179,13 +199,19 @@ class PoseSegmentation(PoseLabeling, Estimator):
         if not meshes:
             raise ValueError("there is no pose to learn from: pass at least one mesh, better three to five")
         overall, parameters = Progress.of(progress), self.get_params()
+        lesson = None if labels is None else lesson_of(labels, meshes, unlabeled, self.preset)
         poses, described = self._all_described(meshes, overall, cache)
         overall = overall.part(described, 1.0)
         overall(0.0, "parts")
-        training = TrainingSamples.of(poses, parameters)
-        learned = learn_parts(parameters, poses, training, rest, cache, overall.part(0.0, GROUPED))
+        training, step = TrainingSamples.of(poses, parameters), overall.part(0.0, GROUPED)
         atlases = None
-        if learned.grouping is not None:
+        if lesson is not None:
+            learn = partial(learn_taught_parts, parameters, poses, training=training, rest=rest, cache=cache)
+            labeler_of = partial(self._labeler_of, standardizer=training.standardizer)
+            learned, atlases = learned_lesson(lesson, learn, labeler_of, poses, rest, overall.part(0.0, RECOGNIZED))
+        else:
+            learned = learn_parts(parameters, poses, training, rest, cache, step)
+        if lesson is None and learned.grouping is not None:
             learned, atlases = self._recognized(
                 learned, training.standardizer, poses, rest, overall.part(GROUPED, RECOGNIZED)
             )
@@ -266,7 +292,9 @@ class PoseSegmentation(PoseLabeling, Estimator):
         if poses:
             known = [atlas for atlas in (self.regions_, self.sides_) if atlas is not None]
             described = [model._described(pose) for pose in poses]
-            model.regions_, model.sides_ = model._labeler().atlases(described, rest, Progress(), known)
+            model.regions_, sides = model._labeler().atlases(described, rest, Progress(), known)
+            # Sides of taught parts were taught.
+            model.sides_ = sides if self.taught_ is None else self.sides_
         return model
 
     def save(self, path: str | PathLike[str]) -> None:
@@ -327,7 +355,7 @@ class PoseSegmentation(PoseLabeling, Estimator):
 
     def _learned(self) -> PartMixture:
         """What was learned of the parts; NotFittedError if nothing was."""
-        return PartMixture(self._fitted(), self.grouping_, self.kind_traits_)
+        return PartMixture(self._fitted(), self.grouping_, self.kind_traits_, self.taught_)
 
     def _set_learned(
         self,
@@ -337,7 +365,7 @@ class PoseSegmentation(PoseLabeling, Estimator):
         scores: FloatArray,
     ) -> None:
         self.mixture_, self.standardizer_ = learned.mixture, standardizer
-        self.grouping_, self.kind_traits_ = learned.grouping, learned.traits
+        self.grouping_, self.kind_traits_, self.taught_ = learned.grouping, learned.traits, learned.taught
         self.regions_, self.sides_ = atlases or (None, None)
         self.usual_scores_ = scores
 
@@ -355,7 +383,7 @@ class PoseSegmentation(PoseLabeling, Estimator):
         """
         assert learned.grouping is not None
         for round_ in range(MERGING_ROUNDS):
-            labeler = self._labeler_of(learned.mixture, standardizer, learned.grouping, learned.traits)
+            labeler = self._labeler_of(learned, standardizer)
             atlases = labeler.atlases(poses, rest, progress.part(0.0, FIRST_ROUND, "regions"))
             progress = progress.part(FIRST_ROUND, 1.0)
             lost = sorted(set(range(labeler.n_segments)) - set(atlases[1].traits.segment.tolist()))

@@ -98,7 +98,7 @@ def text_of(call):
 
 def sources():
     """The modules whose texts can be seen in the window."""
-    for part in ("core", "blender"):
+    for part in ("core", "rigs", "blender"):
         for path in sorted((PACKAGE / part).rglob("*.py")):
             if path.name != "message.py" and not TERMINAL & set(path.relative_to(PACKAGE).parts):
                 yield Source(path)

@@ -53,7 +53,16 @@ OUTPUT_FLAGS = {
 """Option to setting and help, of options without a value for commands that write labels."""
 BAKE_OPTIONS = {"--size": "bake_size", "--margin": "bake_margin", "--palette": "palette", "--sides": "sides"}
 """Option to setting, of `bake`."""
-AUTO_SETTINGS = {"n_segments": "auto_segments"}
+PART_SOURCE_OPTION = "--parts-from"
+"""Option that says where the parts are that a model is taught."""
+TEACH_OPTIONS = {"--parts": "bone_parts", "--other-faces": "unlabeled"}
+"""Option to setting, of commands that teach a model parts."""
+TEACH_FLAGS = {
+    "--join-sides": ("taught_sides", False, "teach left and right as one part"),
+    "--all-face-sets": ("all_face_sets", True, "teach face set 1 as well, which unpainted faces have"),
+}
+"""Option to setting, its value and help, of options without a value for commands that teach a model parts."""
+AUTO_SETTINGS = {"n_segments": "auto_segments", "bone_parts": "usual_parts"}
 """Number to the setting that leaves its choice to the method, for which its option takes the word "auto"."""
 
 
@@ -146,6 +155,56 @@ def add_labeling_settings(parser: argparse.ArgumentParser) -> None:
         add_setting(parser, option, SEGMENTATION_OPTIONS[option])
 
 
+def add_teaching(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say which parts a model is taught."""
+    sources = {_option_value(item.identifier): item for item in _property("parts_from").enum_items}
+    parser.add_argument(
+        PART_SOURCE_OPTION, dest="parts_from", choices=list(sources),
+        help="learn the parts that the files have, with their names, instead of finding some: "
+        + "; ".join(f"{name}: {item.description}" for name, item in sources.items()),
+    )  # fmt: skip
+    add_settings(parser, TEACH_OPTIONS)
+    for option, (_, _, text) in TEACH_FLAGS.items():
+        parser.add_argument(option, action="store_true", help=f"with {PART_SOURCE_OPTION}, {text}")
+
+
+def teaching_from(options: argparse.Namespace, settings: WKSSegmentSettings) -> bool:
+    """Take the options that say which parts a model is taught over to the settings; whether it is taught any."""
+    for name in ("parts_from", "bones", *TEACH_OPTIONS.values()):
+        settings.property_unset(name)
+    settings.property_unset(AUTO_SETTINGS["bone_parts"])
+    for option, (name, value, _) in TEACH_FLAGS.items():
+        given = getattr(options, option.removeprefix("--").replace("-", "_"), False)
+        setattr(settings, name, value if given else not value)
+    source = getattr(options, "parts_from", None)
+    if source is None:
+        return False
+    settings.parts_from = source.upper().replace("-", "_")
+    for name in TEACH_OPTIONS.values():
+        _set(settings, name, getattr(options, name, None))
+    return True
+
+
+def _option_value(identifier: str) -> str:
+    """How the command line writes an item of a setting."""
+    return identifier.lower().replace("_", "-")
+
+
+def _property(name: str) -> Any:
+    """What Blender knows about a setting."""
+    return WKSSegmentSettings.bl_rna.properties[name]
+
+
+def _set(settings: WKSSegmentSettings, name: str, value: Any) -> None:
+    """Give a setting the value of an option; None leaves it as it is."""
+    if value is None:
+        return
+    if name in AUTO_SETTINGS:
+        setattr(settings, AUTO_SETTINGS[name], value == "auto")
+    if value != "auto" or name not in AUTO_SETTINGS:
+        setattr(settings, name, value)
+
+
 def add_settings(parser: argparse.ArgumentParser, options: dict[str, str] = SEGMENTATION_OPTIONS) -> None:
     """Add an option for each setting."""
     for option, name in options.items():
@@ -154,7 +213,7 @@ def add_settings(parser: argparse.ArgumentParser, options: dict[str, str] = SEGM
 
 def add_setting(parser: argparse.ArgumentParser, option: str, name: str) -> None:
     """Add an option for a setting, with the description, limits and default of its property."""
-    setting = WKSSegmentSettings.bl_rna.properties[name]
+    setting = _property(name)
     several = setting.type == "ENUM" and setting.is_enum_flag
     default = "none" if several else setting.default  # Blender warns if it is asked for the default of flags
     arguments: dict[str, Any] = {"dest": name, "help": f"{setting.description} (default: {default})"}
@@ -170,7 +229,7 @@ def add_setting(parser: argparse.ArgumentParser, option: str, name: str) -> None
     if name in AUTO_SETTINGS:
         arguments["type"] = number_or_auto(arguments["type"])
         arguments["metavar"] = "N|auto"
-        arguments["help"] += f"; auto: {WKSSegmentSettings.bl_rna.properties[AUTO_SETTINGS[name]].description}"
+        arguments["help"] += f"; auto: {_property(AUTO_SETTINGS[name]).description}"
     arguments["help"] = arguments["help"].replace("%", "%%")
     parser.add_argument(option, **arguments)
 
@@ -181,12 +240,9 @@ def settings_from(options: argparse.Namespace) -> WKSSegmentSettings:
     settings.property_unset("write_colors")
     for name in (SEGMENTATION_OPTIONS | OUTPUT_OPTIONS | BAKE_OPTIONS).values():
         settings.property_unset(name)
-        value = getattr(options, name, None)
-        is_auto = name in AUTO_SETTINGS and value == "auto"
         if name in AUTO_SETTINGS:
-            setattr(settings, AUTO_SETTINGS[name], is_auto)
-        if value is not None and not is_auto:
-            setattr(settings, name, value)
+            settings.property_unset(AUTO_SETTINGS[name])
+        _set(settings, name, getattr(options, name, None))
     for name, _ in OUTPUT_FLAGS.values():
         setattr(settings, name, getattr(options, name, False))
     return settings

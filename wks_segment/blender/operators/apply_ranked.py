@@ -67,7 +67,9 @@ class WKS_SEGMENT_OT_apply_ranked(LabelOperator, bpy.types.Operator):
         else:
             model, file = self.job.model, Path(item.path).name
             summary = [Message("From {names}", names=file), Message("{count} segments", count=model.n_segments_)]
-            labels = model_library.add_model(settings, copy(model), item.name, summary)
+            is_starter = Path(item.path) in model_library.starters().values()
+            add = model_library.add_once if is_starter else model_library.add_model
+            labels = add(settings, copy(model), item.name, summary)
             self.job.uid = part_ids.model_of(labels)
             # The model is in the scene now, under a name that may have got a number.
             item.name, item.path = settings.models[settings.used_model].name, ""

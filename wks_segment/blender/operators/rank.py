@@ -6,6 +6,7 @@ import bpy
 
 from ...core.message import Message
 from ..props.preferences import model_folder
+from ..workflow import model_library
 from ..workflow.live_session import session_of
 from ..workflow.model_ranking import RankingJob
 from . import _needs, _report
@@ -13,11 +14,11 @@ from ._base import JobOperator
 
 
 def _any_model(context: bpy.types.Context) -> Message | None:
-    """A message if there is neither a model in this scene nor a model folder.
+    """A message if there is neither a model in this scene or the extension, nor a model folder.
 
     The folder itself is not searched, since this is called whenever the panel is drawn and the folder may be slow.
     """
-    if context.scene.wks_segment.model or model_folder(context):
+    if context.scene.wks_segment.model or model_folder(context) or model_library.starters():
         return None
     return Message("No model yet: learn one, import one, or set Model Folder in the preferences")
 
@@ -28,8 +29,8 @@ class WKS_SEGMENT_OT_rank(JobOperator[RankingJob], bpy.types.Operator):
     bl_idname = "wks_segment.rank"
     bl_label = "Rank Models"
     bl_description = (
-        "Rank the models of this scene and of the model folder by how well they fit the active character. Nothing "
-        "is applied"
+        "Rank the models of this scene, of the model folder and of the extension by how well they fit the active "
+        "character. Nothing is applied"
     )
     bl_options = {"REGISTER", "UNDO"}
 

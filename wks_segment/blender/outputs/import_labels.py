@@ -35,7 +35,7 @@ LABEL_SOURCES = (
 
 
 @dataclass(frozen=True)
-class _Membership:
+class Membership:
     """What the polygons of a mesh are in: (p,) indices of keys, and the part of each key that is one of ours."""
 
     index: IntArray
@@ -62,7 +62,7 @@ def corrected_parts(
     UserError
         If an object has nothing of that kind.
     """
-    memberships = [_membership(obj, source) for obj in character.objects]
+    memberships = [membership_of(obj, source) for obj in character.objects]
     parts = {key: part for membership in memberships for key, part in membership.ours.items()}
     taken = set(segments_of(np.array(list(parts.values()), dtype=np.int64)).tolist())
     free = iter([segment for segment in range(SIDE_STEP) if segment not in taken])
@@ -84,7 +84,7 @@ def corrected_labels(character: Character, source: str, parts: dict[Hashable, in
     """(p,) part of each of a character's polygons, given the parts from `corrected_parts`."""
     labels = []
     for obj in character.objects:
-        membership = _membership(obj, source)
+        membership = membership_of(obj, source)
         numbers = np.array([parts.get(key, 0) for key in membership.keys], dtype=np.int64)
         labels.append(numbers[membership.index])
     return np.concatenate(labels)
@@ -100,11 +100,12 @@ def corrected_weights(character: Character, parts: dict[Hashable, int]) -> dict[
     }
 
 
-def _membership(obj: bpy.types.Object, source: str) -> _Membership:
+def membership_of(obj: bpy.types.Object, source: str) -> Membership:
+    """What the polygons of an object are in; UserError if it has nothing of that kind."""
     return {FACE_SETS: _in_face_sets, MATERIALS: _in_materials, VERTEX_GROUPS: _in_groups}[source](obj)
 
 
-def _in_face_sets(obj: bpy.types.Object) -> _Membership:
+def _in_face_sets(obj: bpy.types.Object) -> Membership:
     numbers = read_attribute(obj.data, FACE_SET_ATTRIBUTE)
     if numbers is None:
         raise UserError(
@@ -112,20 +113,20 @@ def _in_face_sets(obj: bpy.types.Object) -> _Membership:
         )
     keys, index = np.unique(numbers, return_inverse=True)
     ours = [int(number) for number in Ledger(obj.data).get("face_sets", [])]
-    return _Membership(index.ravel(), keys.tolist(), {number: number - FIRST_FACE_SET for number in ours})
+    return Membership(index.ravel(), keys.tolist(), {number: number - FIRST_FACE_SET for number in ours})
 
 
-def _in_materials(obj: bpy.types.Object) -> _Membership:
+def _in_materials(obj: bpy.types.Object) -> Membership:
     materials = [slot.material for slot in obj.material_slots]
     if not materials:
         raise UserError('"{name}" has no materials: assign some, or let segments write theirs', name=obj.name)
     slots = read_ints(obj.data.polygons, "material_index")
     ours = {material: part for material in materials if (part := part_of(material)) is not None}
     # Blender shows the last material on faces with an index beyond the last slot.
-    return _Membership(np.minimum(slots, len(materials) - 1), materials, ours)
+    return Membership(np.minimum(slots, len(materials) - 1), materials, ours)
 
 
-def _in_groups(obj: bpy.types.Object) -> _Membership:
+def _in_groups(obj: bpy.types.Object) -> Membership:
     weights, ours = group_weights(obj.data), our_groups(obj.data)
     names = [name for name in weights if not ours or name not in own_groups(obj.data)]
     if not names:
@@ -134,4 +135,4 @@ def _in_groups(obj: bpy.types.Object) -> _Membership:
     sums = np.add.reduceat(np.stack([weights[name] for name in names], axis=1)[vertices], starts, axis=0)
     # Faces in no group are one more part.
     index = np.where(sums.any(axis=1), sums.argmax(axis=1), len(names))
-    return _Membership(index, [*names, None], ours)
+    return Membership(index, [*names, None], ours)

@@ -36,6 +36,12 @@ class PropertyListener(Protocol):
     def recolor_part(self, settings: Any, labels: str, part: int, color: tuple[float, float, float]) -> None:
         """The user has chosen another color for a part."""
 
+    def bone_number_changed(self, settings: Any) -> None:
+        """The user asks for another number of parts from bones."""
+
+    def bones_chosen(self, settings: Any) -> None:
+        """The user has chosen a bone as a part, or let it join another."""
+
 
 _connected: list[PropertyListener] = []
 
@@ -88,4 +94,10 @@ class _Deaf:
         """Nothing."""
 
     def recolor_part(self, settings: Any, labels: str, part: int, color: tuple[float, float, float]) -> None:
+        """Nothing."""
+
+    def bone_number_changed(self, settings: Any) -> None:
+        """Nothing."""
+
+    def bones_chosen(self, settings: Any) -> None:
         """Nothing."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.props import FloatProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 
 from .changes import listener
 
@@ -51,4 +51,7 @@ class WKSRankItem(bpy.types.PropertyGroup):
     )
     probability: FloatProperty(
         name="Probability", description="Probability of the model among the ranked ones", min=0.0, max=1.0
+    )
+    fits: BoolProperty(
+        name="Fits", description="Whether the character is like those that the model was learned from", default=True
     )

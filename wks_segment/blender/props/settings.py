@@ -24,6 +24,7 @@ from .changes import listener
 from .label_set import WKSLabelSet
 from .model_item import WKSModelItem, WKSRankItem
 from .segment_item import WKSSegmentItem
+from .teach_settings import TeachSettings
 
 LABEL_SETTINGS: dict[str, dict[str, Any]] = {
     "n_segments": {
@@ -90,7 +91,7 @@ def _model_chosen(settings: WKSSegmentSettings, context: bpy.types.Context) -> N
     listener().model_chosen(settings)
 
 
-class WKSSegmentSettings(bpy.types.PropertyGroup):
+class WKSSegmentSettings(TeachSettings, bpy.types.PropertyGroup):
     """Settings and the learned model, stored with the scene."""
 
     source: EnumProperty(

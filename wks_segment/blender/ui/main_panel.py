@@ -115,6 +115,7 @@ class WKS_SEGMENT_PT_main(_Sidebar, bpy.types.Panel):
         column.scale_y = 1.4
         column.operator("wks_segment.learn", icon="MOD_EXPLODE")
         column.operator("wks_segment.apply", icon="BRUSHES_ALL")
+        column.operator("wks_segment.name_parts", icon="OUTLINER_DATA_FONT")
         self.layout.operator("wks_segment.clear", icon="X")
         self.status(context)
 

@@ -16,7 +16,7 @@ class WKS_SEGMENT_MT_object(bpy.types.Menu):
     def draw(self, context: bpy.types.Context) -> None:
         # As by the buttons, jobs run in a thread, and a large one is asked about.
         self.layout.operator_context = "INVOKE_DEFAULT"
-        for name in ("learn", "apply", "rank", "apply_ranked", "clear"):
+        for name in ("learn", "teach", "apply", "name_parts", "rank", "apply_ranked", "clear"):
             self.layout.operator(f"wks_segment.{name}")
         self.layout.separator()
         for name in ("bake", "unwrap", "separate", "transfer"):

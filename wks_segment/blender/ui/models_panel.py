@@ -40,7 +40,7 @@ class WKS_SEGMENT_MT_model_folder(bpy.types.Menu):
     bl_label = "Add from Model Folder"
 
     def draw(self, context: bpy.types.Context) -> None:
-        models = model_library.in_folder(model_folder(context))
+        models = model_library.starters() | model_library.in_folder(model_folder(context))
         self.layout.operator_context = "EXEC_DEFAULT"  # without the file browser
         for name, path in models.items():
             self.layout.operator("wks_segment.load_model", text=name, translate=False).filepath = str(path)
@@ -83,10 +83,11 @@ def draw_ranking(layout: Any, settings: Any) -> None:
             column.label(text=line)
     for index, item in enumerate(settings.ranking[:SHOWN_RANKS]):
         row = column.row(align=True)
+        row.active = item.fits
         row.label(text=item.name, translate=False)
         share = row.row(align=True)
         share.alignment = "RIGHT"
-        share.label(text=f"{100 * item.probability:.0f} %")
+        share.label(text=f"{100 * item.probability:.0f} %" if item.fits else in_panel("does not fit"))
         row.operator("wks_segment.apply_ranked", text=in_panel("Use"), icon="BRUSHES_ALL").index = index
 
 

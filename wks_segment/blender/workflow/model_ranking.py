@@ -51,7 +51,9 @@ def verdict_message(ranking: Ranking, names: Sequence[str]) -> Message:
 
 
 def models_to_rank(context: bpy.types.Context, report: Report) -> list[NamedModel]:
-    """The models of the scene and of the model folder; one that cannot be read is left out with a warning.
+    """The models of the scene, of the model folder and of the extension; one that cannot be read is left out.
+
+    The report gets a warning about it.
 
     Raises
     ------
@@ -64,7 +66,9 @@ def models_to_rank(context: bpy.types.Context, report: Report) -> list[NamedMode
             models.append(NamedModel(name, PoseSegmentation.from_json(text)))
         except ValueError as error:
             report.warn(Message('The model "{name}" was left out: {reason}', name=name, reason=message_of(error)))
-    models = without_copies([*models, *models_in_files(model_library.in_folder(model_folder(context)), report)])
+    for files in (model_library.in_folder(model_folder(context)), model_library.starters()):
+        models += models_in_files(files, report)
+    models = without_copies(models)
     if not models:
         raise UserError("No model yet: learn one, import one, or set Model Folder in the preferences of the add-on")
     return models
@@ -194,10 +198,14 @@ class RankingJob:
         settings = self.guard.scene().wks_segment
         names = [named.name for named in self.models]
         settings.ranking.clear()
-        for place in self.ranking.ranks:
+        starters = set(model_library.starters().values())
+        in_order = sorted(
+            self.ranking.ranks, key=lambda rank: not (rank.fits and self.models[rank.index].path in starters)
+        )
+        for place in in_order:
             item, named = settings.ranking.add(), self.models[place.index]
             item.name, item.path = named.name, str(named.path or "")
-            item.score, item.probability = place.score, place.probability
+            item.score, item.probability, item.fits = place.score, place.probability, place.fits
         character = self.poses[0].character
         settings.ranked = json.dumps([member.name for member in character.members])
         verdict = Message(

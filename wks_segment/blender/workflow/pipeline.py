@@ -13,7 +13,8 @@ import bpy
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...core import PoseSegmentation, Workpiece
+from ...core import PartNotes, PoseSegmentation, Workpiece
+from ...core.learning.taught_parts import UnlikePartsError
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ...core.message import Message, message_of
 from ...core.poses.describe import LEARNING
@@ -34,10 +35,16 @@ from ..scene.poses import Pose
 from . import carry_over, model_library, segment_list
 from .describing import Run, describe, prepare
 from .report import Report
+from .teaching import Lesson
 
 SEGMENT_SHARE = 0.6
 """Share of the labeling progress that is spent on segments; the rest tells left from right. A wrong share only makes
 the progress bar uneven."""
+
+
+TAUGHT_MIN_SHARE = 0.2
+"""How much smaller a region of a taught part may be than *Smallest Part* says: a paw of a fox has 0.5 % of the area,
+and is wanted if it was taught."""
 
 
 @dataclass(frozen=True)
@@ -93,8 +100,8 @@ def check_limits(model: PoseSegmentation, poses: Sequence[Pose], settings: WKSSe
     )
 
 
-def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[Workpiece]:
-    """Fit a model to poses; return the described poses.
+def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run, lesson: Lesson | None = None) -> list[Workpiece]:
+    """Fit a model to poses, and to the parts of a lesson if there is one; return the described poses.
 
     Raises
     ------
@@ -102,7 +109,7 @@ def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[Work
         If the core refuses a pose or the model's parameters; the message names it.
     """
     n_faces = max(int(pose.polygon_of.max()) + 1 for pose in poses)
-    if model.n_segments != "auto" and model.n_segments > n_faces:
+    if lesson is None and model.n_segments != "auto" and model.n_segments > n_faces:
         raise UserError(
             '"{character}" has too few faces ({faces}) for {segments} segments: take fewer segments, or subdivide it',
             character=poses[0].character.name,
@@ -115,11 +122,39 @@ def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[Work
     progress = run.progress.part(share, 1.0).titled("Learning the segments")
     with run.report.stage("mixture"):
         try:
-            model.fit(described, progress, poses[0].upright, run.cache)
+            if lesson is None:
+                model.fit(described, progress, poses[0].upright, run.cache)
+            else:
+                _fit_to(lesson, model, described, poses[0], run.with_progress(progress))
         except ValueError as error:
             raise UserError("The segments could not be learned: {reason}", reason=message_of(error)) from error
     run.report.add_model(model)
     return described
+
+
+def _fit_to(lesson: Lesson, model: PoseSegmentation, described: Sequence[Workpiece], first: Pose, run: Run) -> None:
+    """Fit a model to the parts of a lesson, and give it their names; parts of the same shape become one if they may.
+
+    Raises
+    ------
+    UserError
+        If two other parts have the same shape.
+    ValueError
+        If the core refuses the parts.
+    """
+    while True:
+        try:
+            model.fit(
+                described, run.progress, first.upright, run.cache, labels=lesson.labels, unlabeled=lesson.unlabeled
+            )
+        except UnlikePartsError as error:
+            lesson, told = lesson.joined(*error.parts)
+            run.report.warn(told)
+        except ValueError as error:
+            raise lesson.named(error) from error
+        else:
+            model.part_notes_ = PartNotes(names=dict(enumerate(lesson.names)))
+            return
 
 
 def label(
@@ -135,7 +170,7 @@ def label(
             parts = _parts_of(model, views, request, run.progress.part(i / len(groups), (i + 1) / len(groups)))
             labels |= {poses[j].character: parts for j in group}
     run.report.add_labels(np.concatenate(list(labels.values())))
-    if request.sides == "two" and len(run.report.parts) == run.report.n_segments:
+    if request.sides == "two" and model.taught_ is None and len(run.report.parts) == run.report.n_segments:
         run.report.warn(
             "Left and right are not told apart with the method of the paper: both sides are one part"
             if model.sides_ is None
@@ -167,6 +202,8 @@ def _parts_of(model: PoseSegmentation, views: MeshViews, request: LabelRequest, 
     """(p,) part of each polygon of a mesh."""
     two_sides = request.sides == "two"
     min_share = None if model.preset == "paper" else request.min_share
+    if model.taught_ is not None and min_share is not None:
+        min_share *= TAUGHT_MIN_SHARE
     stage = Message('Segments of "{character}"', character=views.name)
     step = progress.part(0.0, SEGMENT_SHARE if two_sides else 1.0, stage)
     step(0.0)

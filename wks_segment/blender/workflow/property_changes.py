@@ -8,7 +8,7 @@ import bpy
 
 from ...core.message import Message, message_of
 from ..errors import UserError
-from . import model_library, pipeline, segment_list
+from . import bone_list, model_library, pipeline, segment_list
 from .all_or_nothing import all_or_nothing
 from .live_session import session_of
 
@@ -61,3 +61,11 @@ class PropertyChanges:
         """Recolor a part wherever its color is written."""
         with segment_list.leaving_edit_mode(bpy.context), all_or_nothing(bpy.context):
             segment_list.recolor(settings, labels, part, color)
+
+    def bone_number_changed(self, settings: Any) -> None:
+        """Choose as many bones of the tree as parts."""
+        bone_list.choose(settings)
+
+    def bones_chosen(self, settings: Any) -> None:
+        """Show how many parts are chosen."""
+        bone_list.count_chosen(settings)

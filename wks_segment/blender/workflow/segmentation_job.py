@@ -32,6 +32,7 @@ from .followed_settings import values_of
 from .model_ranking import NamedModel, fit_warning, models_of
 from .pipeline import LabelRequest
 from .report import Report, absent_warnings, pose_warnings, segment_warnings, shape_warnings
+from .teaching import Lesson, read_lesson, read_lesson_poses
 
 LEARN_SHARE = 0.97
 """Share of the progress of a job that learns before labeling: what takes long is known from learning."""
@@ -78,6 +79,8 @@ class SegmentationJob:
         The job that this one repeats with other settings.
     labels
         The part of each polygon of each character, once computed.
+    lesson : Lesson, optional
+        The parts that the model is taught, if it learns named ones.
     """
 
     model: PoseSegmentation
@@ -95,6 +98,7 @@ class SegmentationJob:
     described: list[Workpiece] = field(default_factory=list)
     first: SegmentationJob | None = None
     labels: dict[Character, IntArray] = field(default_factory=dict)
+    lesson: Lesson | None = None
     _weights: dict[Character, dict[int, FloatArray]] | None = None
 
     @classmethod
@@ -109,13 +113,27 @@ class SegmentationJob:
         return cls._read(context, settings.new_model(), report, cache, learns=True)
 
     @classmethod
+    def teaching(cls, context: bpy.types.Context, cache: Cache) -> SegmentationJob:
+        """Read the parts of the selected characters, and poses to learn them from; UserError if they cannot be used."""
+        settings, report = context.scene.wks_segment, Report([])
+        with report.stage("read"):
+            objects = without_transferred(selected_meshes(context), report)
+            report.poses = read_lesson_poses(context, objects, report)
+            lesson = read_lesson(settings, report.poses, report)
+        report.warn(*report.left_out)
+        job = cls._read(context, settings.new_model(), report, cache, learns=True)
+        job = replace(job, lesson=lesson)
+        return replace(job, name=job.identity())
+
+    @classmethod
     def applying(
         cls, context: bpy.types.Context, cache: Cache, model: PoseSegmentation | None = None,
-        objects: Sequence[bpy.types.Object] = (), uid: str = "",
+        objects: Sequence[bpy.types.Object] = (), uid: str = "", keeps_number: bool = False,
     ) -> SegmentationJob:  # fmt: skip
         """Read objects to apply a model to: the selected ones and the model in use if none are given.
 
-        The model is applied with the number of segments in the settings; `uid` is its identity, if it is of the scene.
+        The model is applied with the number of segments in the settings, unless it keeps its own; `uid` is its
+        identity, if it is of the scene.
 
         Raises
         ------
@@ -127,7 +145,9 @@ class SegmentationJob:
             model, uid = pipeline.stored_model(settings), model_library.used_uid(settings)
         model.smoothness = settings.smoothness
         number = settings.number()
-        if number not in ("auto", min(model.n_segments_, MAX_COLORS), model.n_segments):
+        if not keeps_number and model.taught_ is not None:
+            _show_number_of(model, settings, report)
+        elif not keeps_number and number not in ("auto", min(model.n_segments_, MAX_COLORS), model.n_segments):
             try:
                 model = model.with_segments(number)
             except ValueError as error:
@@ -162,6 +182,12 @@ class SegmentationJob:
         job = cls(model, poses, request, guard, report, learns, settings.number(), cache, values_of(settings), uid)
         return replace(job, name=job.identity())
 
+    def take_number(self) -> None:
+        """Count as labeled with the number of segments that the model has, whatever the settings ask for."""
+        if self.number != "auto":
+            self.number = min(self.model.n_segments_, MAX_COLORS)
+            self.values = {**self.values, "n_segments": self.number}
+
     def identity(self) -> str:
         """A hash of the model and the poses, the same whenever the same is done with the same meshes."""
         model = repr(self.model) if self.learns else self.uid or self.model.to_json()
@@ -169,6 +195,10 @@ class SegmentationJob:
         for pose in self.poses:
             digest.update(repr((pose.name, [member.name for member in pose.character.members])).encode())
             digest.update(pose.mesh.vertices.tobytes())
+        if self.lesson is not None:
+            digest.update(repr((self.lesson.names, self.lesson.unlabeled)).encode())
+            for labels in self.lesson.labels:
+                digest.update(labels.tobytes())
         return digest.hexdigest()
 
     def with_settings(
@@ -192,7 +222,9 @@ class SegmentationJob:
         report = Report(first.poses, first.report.laplacians)
         model = copy(first.model)
         model.smoothness = settings.smoothness
-        if number != first.number:
+        if number != first.number and model.taught_ is not None:
+            _show_number_of(model, settings, report)
+        elif number != first.number:
             # Regions are learned anew only where sides need them; labels of one part for both sides do not.
             described = first.described if first.learns and settings.sides == "two" else []
             try:
@@ -245,7 +277,9 @@ class SegmentationJob:
         run = Run(self.report, progress, self.cache)
         if self.learns:
             run = run.with_progress(progress.part(0.0, LEARN_SHARE))
-            self.described = pipeline.learn(self.model, self.poses, run)
+            self.described = pipeline.learn(self.model, self.poses, run, self.lesson)
+            if self.lesson is not None:
+                self.take_number()
             return progress.part(LEARN_SHARE, 1.0)
         self.described, rest = describing.describe_to_label(self.model, self.poses, run)
         return rest
@@ -267,10 +301,22 @@ class SegmentationJob:
             origin = Message("From {names}", names=first_names + " …" * (len(names) > 3))
             lines = [origin, *self.report.facts[:3], *self.report.choices]
             members = [member.name for pose in self.poses for member in pose.character.members]
-            labels = model_library.learned(settings, copy(self.model), lines, members, first_names)
+            labels = model_library.learned(
+                settings, copy(self.model), lines, members, first_names, keeps_names=self.lesson is not None
+            )
             self.uid = part_ids.model_of(labels)
             return labels
         return model_library.adjusted(settings, self.uid, copy(self.model))
+
+
+def _show_number_of(model: PoseSegmentation, settings: WKSSegmentSettings, report: Report) -> None:
+    """Show the number of a taught model's segments in the field; the report is told if another one was asked for."""
+    number = min(model.n_segments_, MAX_COLORS)
+    if settings.number() in ("auto", number):
+        return
+    report.warn(Message("The model has the {count} segments that it was taught", count=model.n_segments_))
+    with unheard():
+        settings.n_segments = number
 
 
 def without_transferred(objects: Sequence[bpy.types.Object], report: Report) -> list[bpy.types.Object]:

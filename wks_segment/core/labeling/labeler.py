@@ -6,7 +6,7 @@ segments, or another smoothness, computes only the results that depend on it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ from ..geometry.graph_cut import REGION_CREASE, REGION_WIDTH, CutStyle
 from ..learning.gaussian_mixture import GaussianMixture
 from ..learning.merge_tree import MergeTree
 from ..learning.standardizer import Standardizer
+from ..learning.taught_parts import TaughtParts
 from ..mesh.adjacency import FaceAdjacency
 from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
 from ..parts.kind_traits import KindTraits
@@ -25,13 +26,16 @@ from .learned_areas import with_learned_areas
 from .own_parts import OwnParts, own_parts
 from .polygons import Cleaning, PolygonMesh
 from .region_atlas import RegionAtlas
-from .sides import side_field, sides_of_regions
+from .sides import have_counterpart, side_field, sides_of_regions
+from .taught_sides import halves
 from .traits import FIELDS, Regions, Traits, mean_traits
 
 LABELS_SHARE = 0.7
 """Share of the time of finding regions that their labels take; the rest is recognizing the regions."""
 MIN_SHARE = 0.005
 """Default share of the area that a connected region must have to keep its label."""
+SMALLEST_OF_TAUGHT = 0.15
+"""With taught parts that are small, at most this share of the smallest one: it may lie in several regions."""
 STRAY_SHARE = 0.15
 """A connected region with less than this share of the area of the largest one of its segment is too small as well. Such
 regions are bands between two other segments where the signature passes through the values of a third, such as a band of
@@ -62,6 +66,11 @@ class Labeler:
         Smoothing length in units of the square root of the area; 0: no smoothing.
     traits : KindTraits or None
         Of the kinds of parts, if the model is of several meshes: a mesh is then cut by its own shape.
+    taught : TaughtParts or None
+        Which of the first segments are parts that a user taught; two of them can be one segment here, told apart by
+        their side.
+    sides_atlas : RegionAtlas or None
+        Tells these sides.
     """
 
     mixture: GaussianMixture
@@ -70,6 +79,8 @@ class Labeler:
     n_segments: int
     length: float
     traits: KindTraits | None = None
+    taught: TaughtParts | None = None
+    sides_atlas: RegionAtlas | None = None
 
     @property
     def n_kept(self) -> int:
@@ -81,11 +92,27 @@ class Labeler:
     @property
     def min_share(self) -> float:
         """Default of the smallest share of the area that a region must have."""
-        return MIN_SHARE if self.length > 0 else 0.0
+        if self.length == 0:
+            return 0.0
+        if self.taught is None or self.grouping is None or self.grouping.areas is None:
+            return MIN_SHARE
+        # A taught finger is small, and may be so.
+        of_groups = np.bincount(self.grouping.groups(self.n_segments), self.grouping.areas)
+        return float(min(MIN_SHARE, SMALLEST_OF_TAUGHT * of_groups[: self.taught.n_groups].min()))
 
     def posteriors(self, pose: Workpiece) -> FloatArray:
         """(n', n_segments) posteriors of the segments at the vertices of the surface of a pose."""
         return self._merged(self._raw(pose, self.n_kept), self.n_segments)
+
+    def of_parts(self, pose: Workpiece, posteriors: FloatArray) -> FloatArray:
+        """(n', parts) posteriors at the vertices of a pose, with the taught left and right parts as two."""
+        if self.taught is None:
+            return posteriors
+        side = np.ones(len(posteriors))
+        if len(self.taught.sided) and self.sides_atlas is not None:
+            (_, field), *_ = self._fields_of_sides(self.sides_atlas, [pose], Progress())
+            side = pose.surface.from_faces(field[:, None])[:, 0]
+        return self.taught.of_parts(posteriors, side)
 
     def smoothed(self, pose: Workpiece, n_groups: int) -> FloatArray:
         """(n', n_groups) smoothed posteriors of groups at the vertices of a pose."""
@@ -106,7 +133,17 @@ class Labeler:
         mesh = self._polygon_mesh(poses, polygons)
         posteriors = self._mean_posteriors(mesh, poses, polygons is not None, self.n_segments, progress)
         cleaning = Cleaning(CutStyle(self.length), min_share, STRAY_SHARE if min_share > 0 else 0.0)
-        return mesh.labels(poses, posteriors, cleaning, marked)
+        labels, neighbors = mesh.labels(poses, posteriors, cleaning, marked)
+        if self.taught is None:
+            return labels, neighbors
+        sides = np.ones(len(labels), dtype=np.int64)
+        if len(self.taught.sided) and self.sides_atlas is not None:
+            votes = [
+                halves(mesh.of_faces(field, i), labels, neighbors, mesh.areas)
+                for i, field in self._fields_of_sides(self.sides_atlas, poses, progress)
+            ]
+            sides = np.where(np.mean(votes, axis=0) < 0, -1, 1)
+        return self.taught.parts(labels, sides), neighbors
 
     def numbered_regions(self, atlas: RegionAtlas, pose: Workpiece, min_share: float) -> IntArray:
         """(m,) region of each face, numbered as in the atlas; regions that were not learned have higher numbers."""
@@ -160,17 +197,31 @@ class Labeler:
         progress: Progress,
     ) -> IntArray:
         """(p,) side of each polygon, given the segments; see `PoseSegmentation.polygon_sides`."""
-        voters = _spread_over(poses, VOTERS)
-        votes: list[IntArray] = []
-        for together, step in _steps([poses[i] for i in voters], progress):
-            regions = self._regions(atlas.n_groups, together, self.min_share, step.part(0.0, LABELS_SHARE))
-            numbers = atlas.numbers_of(mean_traits([self._traits(regions, pose, len(together)) for pose in together]))
-            side_of_face = atlas.sides_of(regions.numbered(numbers, len(atlas.side)))
-            for pose, _ in step.part(LABELS_SHARE, 1.0).each(together):
-                field = _side_field(pose, regions, atlas, side_of_face)
-                votes.append(_sides_in_pose(pose, field, polygons[voters[len(votes)]], labels))
+        votes = [
+            _sides_in_pose(poses[i], field, polygons[i], labels)
+            for i, field in self._fields_of_sides(atlas, poses, progress)
+        ]
         # A tie between left and neither is neither.
         return np.trunc(np.median(votes, axis=0)).astype(np.int64)
+
+    def _fields_of_sides(
+        self, atlas: RegionAtlas, poses: Sequence[Workpiece], progress: Progress
+    ) -> Iterator[tuple[int, FloatArray]]:
+        """Index of each pose that votes on sides, and the (m,) side field on its faces."""
+        voters = _spread_over(poses, VOTERS)
+        done = 0
+        for together, step in _steps([poses[i] for i in voters], progress):
+            regions = self._regions(atlas.n_groups, together, self.min_share, step.part(0.0, LABELS_SHARE))
+            found = mean_traits([self._traits(regions, pose, len(together)) for pose in together])
+            numbers = atlas.numbers_of(found)
+            side = atlas.sides_of(numbers)
+            if self.taught is not None:
+                # Thighs can be one region in one pose and two in another, of which one would be matched with a crumb.
+                side = np.where(have_counterpart(found.area, side, found.segment), side, 0)
+            side_of_face = np.append(side, 0)[np.minimum(regions.region, len(side))]
+            for pose, _ in step.part(LABELS_SHARE, 1.0).each(together):
+                yield voters[done], _side_field(pose, regions, atlas, side_of_face)
+                done += 1
 
     def _atlas(
         self, n_groups: int, poses: Sequence[Workpiece], rest: TriangleMesh | None, progress: Progress
@@ -178,17 +229,26 @@ class Labeler:
         first = poses[0].surface.original
         if rest is not None and not np.array_equal(rest.faces, first.faces):
             raise ValueError("rest has other faces than the first pose: pass the same mesh, in its rest position")
-        of_meshes: list[Regions] = []
+        regions, traits = self.regions_of(n_groups, poses, progress, MOST_LEARNED)
+        centers = regions[0].centers(first if rest is None else rest)
+        return RegionAtlas.learned(n_groups, traits, centers, alike=all(one is regions[0] for one in regions))
+
+    def regions_of(
+        self, n_groups: int, poses: Sequence[Workpiece], progress: Progress, most: int | None = None
+    ) -> tuple[list[Regions], list[Traits]]:
+        """Connected regions of groups on each pose, which are the same object for poses of one mesh, and their traits.
+
+        With `most`, of at most so many poses of one mesh.
+        """
+        of_poses: list[Regions] = []
         traits: list[Traits] = []
         for together, step in _steps(poses, progress):
             regions = self._regions(n_groups, together, self.min_share, step.part(0.0, LABELS_SHARE))
-            of_meshes.append(regions)
-            for pose, _ in step.part(LABELS_SHARE, 1.0).each(
-                [together[i] for i in _spread_over(together, MOST_LEARNED)]
-            ):
+            measured = together if most is None else [together[i] for i in _spread_over(together, most)]
+            for pose, _ in step.part(LABELS_SHARE, 1.0).each(measured):
+                of_poses.append(regions)
                 traits.append(self._traits(regions, pose, len(together)))
-        centers = of_meshes[0].centers(first if rest is None else rest)
-        return RegionAtlas.learned(n_groups, traits, centers, alike=len(of_meshes) == 1)
+        return of_poses, traits
 
     def _regions(self, n_groups: int, poses: Sequence[Workpiece], min_share: float, progress: Progress) -> Regions:
         """Connected regions of groups on a mesh, found in several poses of it together."""
@@ -230,9 +290,14 @@ class Labeler:
         return self._with_learned_areas(mesh, self._merged(of_kinds, n_groups))
 
     def _with_learned_areas(self, mesh: PolygonMesh, posteriors: FloatArray) -> FloatArray:
-        """(p, n_groups) posteriors of polygons with the areas that were learned, if the parts of one mesh were."""
+        """(p, n_groups) posteriors of polygons with the areas that were learned, if they count.
+
+        They do for parts of one mesh that nobody named, whose areas in other poses the mixture keeps, and for parts
+        taught on several bodies; not for parts taught on one, where signatures alone are better on other bodies.
+        """
         grouping = self.grouping
-        if grouping is None or grouping.areas is None or self.traits is not None or self.length == 0:
+        do_not_count = self.traits is not None if self.taught is None else not self.taught.of_bodies
+        if grouping is None or grouping.areas is None or do_not_count or self.length == 0:
             return posteriors
         n_groups = posteriors.shape[1]
         shares = np.bincount(grouping.groups(n_groups), grouping.areas, n_groups).astype(np.float64)

@@ -108,6 +108,10 @@ class PolygonMesh:
             progress((i + 1) / len(poses))
         return total / np.maximum(self._times_seen, 1)[:, None]
 
+    def of_faces(self, values: FloatArray, pose: int) -> FloatArray:
+        """(p,) mean of (m,) values on the faces of one of the poses over each polygon; 0 if it does not show it."""
+        return np.asarray(self._in_poses[pose].mean @ values)
+
     def mirrored(self, values: FloatArray) -> FloatArray:
         """(p, K) values of the polygons, averaged with those of their mirror images, if the mesh has any."""
         return values if self._mirror is None else self._mirror.mean(values)

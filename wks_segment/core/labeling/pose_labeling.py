@@ -9,8 +9,9 @@ import numpy as np
 
 from ..learning.gaussian_mixture import GaussianMixture
 from ..learning.merge_tree import MergeTree
-from ..learning.part_mixture import SMOOTHING_LENGTH
+from ..learning.part_mixture import SMOOTHING_LENGTH, PartMixture
 from ..learning.standardizer import Standardizer
+from ..learning.taught_parts import TaughtParts
 from ..mesh.adjacency import connected_regions
 from ..mesh.triangle_mesh import FloatArray, IntArray
 from ..message import Message
@@ -23,6 +24,11 @@ from ..threads import one_blas_thread
 from .labeler import Labeler
 from .region_atlas import RegionAtlas
 
+TAUGHT_LENGTH = 0.015
+"""Width of the smoothing along borders of parts that were taught on one mesh, at smoothness 1, in units of the square root
+of the area: signatures are surer of them than of others, and a neck is a narrow band that more smoothing takes away
+(docs/dev/experiments.md)."""
+
 
 class PoseLabeling(PoseDescriber):
     """Base of models: labels poses with what was learned and the current settings; see `PoseSegmentation`."""
@@ -32,6 +38,7 @@ class PoseLabeling(PoseDescriber):
     standardizer_: Standardizer
     grouping_: MergeTree | None
     kind_traits_: KindTraits | None
+    taught_: TaughtParts | None
     regions_: RegionAtlas | None
     sides_: RegionAtlas | None
 
@@ -48,7 +55,7 @@ class PoseLabeling(PoseDescriber):
     def predict_proba(self, mesh: AnyPose) -> FloatArray:
         """(n, n_segments) posterior of each segment at each vertex; rows sum to 1."""
         labeler, pose = self._labeler(), self._described(mesh)
-        return pose.surface.to_vertices(labeler.posteriors(pose))
+        return pose.surface.to_vertices(labeler.of_parts(pose, labeler.posteriors(pose)))
 
     @one_blas_thread
     def predict_soft(self, mesh: AnyPose) -> FloatArray:
@@ -59,7 +66,7 @@ class PoseLabeling(PoseDescriber):
             # Obtuse triangles let the heat flow a little beyond 0 and 1.
             posteriors = np.clip(posteriors, 0, 1).astype(np.float64)
             posteriors /= posteriors.sum(axis=1, keepdims=True)
-        return pose.surface.to_vertices(posteriors)
+        return pose.surface.to_vertices(labeler.of_parts(pose, posteriors))
 
     @one_blas_thread
     def segment_faces(self, mesh: AnyPose, min_share: float | None = None) -> IntArray:
@@ -163,7 +170,8 @@ class PoseLabeling(PoseDescriber):
     def n_segments_(self) -> int:
         """Number of segments of the fitted model."""
         mixture = self._fitted()
-        return self._number_of_segments(mixture, self.grouping_)
+        n_groups = self._number_of_segments(mixture, self.grouping_, self.taught_)
+        return n_groups if self.taught_ is None else n_groups - self.taught_.n_groups + self.taught_.n_parts
 
     def __sklearn_is_fitted__(self) -> bool:
         """Whether `fit` was called, or a model was loaded; for `sklearn.utils.validation.check_is_fitted`."""
@@ -209,17 +217,22 @@ class PoseLabeling(PoseDescriber):
     def _labeler(self) -> Labeler:
         """Labeler with the learned mixture and the current settings."""
         mixture = self._fitted()
-        return self._labeler_of(mixture, self.standardizer_, self.grouping_, self.kind_traits_)
+        learned = PartMixture(mixture, self.grouping_, self.kind_traits_, self.taught_)
+        return self._labeler_of(learned, self.standardizer_, self.sides_)
 
     def _labeler_of(
-        self,
-        mixture: GaussianMixture,
-        standardizer: Standardizer,
-        grouping: MergeTree | None,
-        traits: KindTraits | None,
+        self, learned: PartMixture, standardizer: Standardizer, sides: RegionAtlas | None = None
     ) -> Labeler:
-        length = float(self._effective("smoothness") * SMOOTHING_LENGTH)
-        return Labeler(mixture, standardizer, grouping, self._number_of_segments(mixture, grouping), length, traits)
+        mixture, grouping, taught = learned.mixture, learned.grouping, learned.taught
+        of_mesh = taught is not None and not taught.of_bodies
+        length = float(self._effective("smoothness") * (TAUGHT_LENGTH if of_mesh else SMOOTHING_LENGTH))
+        n_groups = self._number_of_segments(mixture, grouping, taught)
+        return Labeler(mixture, standardizer, grouping, n_groups, length, learned.traits, taught, sides)
 
-    def _number_of_segments(self, mixture: GaussianMixture, grouping: MergeTree | None) -> int:
-        return len(mixture.weights) if grouping is None else grouping.number_of(self.n_segments)
+    def _number_of_segments(
+        self, mixture: GaussianMixture, grouping: MergeTree | None, taught: TaughtParts | None
+    ) -> int:
+        """Number of groups of components, of which a taught left and right part are one."""
+        if grouping is None:
+            return len(mixture.weights)
+        return grouping.number_of(self.n_segments) if taught is None else taught.number_of(self.n_segments, grouping)

@@ -41,7 +41,14 @@ class RegionAtlas:
     noise: FloatArray
 
     @classmethod
-    def learned(cls, n_groups: int, poses: Sequence[Traits], centers: FloatArray, alike: bool = False) -> RegionAtlas:
+    def learned(
+        cls,
+        n_groups: int,
+        poses: Sequence[Traits],
+        centers: FloatArray,
+        alike: bool = False,
+        known: Sequence[IntArray | None] = (),
+    ) -> RegionAtlas:
         """Learn the regions of one or several poses.
 
         Parameters
@@ -53,12 +60,16 @@ class RegionAtlas:
             Centers of the regions of the first pose, at rest if possible: they tell left from right.
         alike : bool
             Whether the poses are of one mesh and have their regions in the same order.
+        known, optional
+            For each pose the number of each region, if it is known; None if it is not.
         """
         side = np.zeros(len(centers), dtype=np.int64)
         atlas = cls(n_groups, poses[0], side, _in_units(USUAL_NOISE, poses[0]))
         # The mean over poses recognizes regions of each pose more reliably than the first pose alone.
         for _ in range(2):
             numbers = [np.arange(len(pose.segment)) if alike else atlas.numbers_of(pose) for pose in poses]
+            for i, given in enumerate(known):
+                numbers[i] = numbers[i] if given is None else given
             mean = mean_of_numbered(atlas.traits, poses, numbers)
             noise = _in_units(USUAL_NOISE, mean)
             if len(poses) > 1:

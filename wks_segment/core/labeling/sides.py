@@ -111,7 +111,7 @@ def sides_of_regions(
     large = area >= min_share * original.area
     side = np.zeros(count, dtype=np.int64)
     clear = np.flatnonzero(large & (np.abs(mean) > CLEAR_SIDE))
-    side[clear] = np.sign(mean[clear]) * _have_counterpart(area[clear], mean[clear], label_of[clear])
+    side[clear] = np.sign(mean[clear]) * have_counterpart(area[clear], mean[clear], label_of[clear])
     centers = original.face_centers[seen]
     for label in np.unique(label_of[~large]):
         in_large = np.flatnonzero(large[region_of_face] & (label_of[region_of_face] == label))
@@ -122,7 +122,7 @@ def sides_of_regions(
     return np.asarray(side[region])
 
 
-def _have_counterpart(area: FloatArray, mean: FloatArray, label: IntArray) -> BoolArray:
+def have_counterpart(area: FloatArray, mean: FloatArray | IntArray, label: IntArray) -> BoolArray:
     """(r,) whether each region has one of about its area, with its label, on the other side."""
     similar = np.minimum.outer(area, area) >= SIMILAR_AREA * np.maximum.outer(area, area)
     opposite = (label[:, None] == label) & (np.outer(mean, mean) < 0)

@@ -71,6 +71,7 @@ class MergeTree:
         kind: IntArray,
         kinds: Kinds,
         overlaps: FloatArray,
+        n_kinds: int | None = None,
     ) -> MergeTree:
         """The tree of a mixture.
 
@@ -87,8 +88,10 @@ class MergeTree:
             And the order in which they are merged.
         overlaps : (k, k) array
             Share of the area that two kinds both claim: Σ over faces of area times both posteriors.
+        n_kinds : int, optional
+            k, if some kinds are not merged because they have no component.
         """
-        chief, inside = _merged_inside(places, weights, kind, kinds.count)
+        chief, inside = _merged_inside(places, weights, kind, kinds.count if n_kinds is None else n_kinds)
         between, likeness, table = [], [], overlaps.copy()
         measures = [_certainty(table)]
         for (kept, gone), odds in zip(kinds.merges.tolist(), kinds.likeness.tolist(), strict=True):

@@ -37,6 +37,7 @@ from .k_means import k_means
 from .merge_tree import MergeTree
 from .parameters import effective, least_segments
 from .standardizer import Standardizer
+from .taught_parts import TaughtParts
 from .training_samples import TrainingSamples
 
 KINDS_VERSION = 6
@@ -72,11 +73,14 @@ class PartMixture:
         setting.
     traits : KindTraits or None
         Of the kinds, in the order of the groups that these are, if several meshes were learned.
+    taught : TaughtParts or None
+        The first groups as parts that a user taught, if any.
     """
 
     mixture: GaussianMixture
     grouping: MergeTree | None
     traits: KindTraits | None
+    taught: TaughtParts | None = None
 
     def for_ranking(self, mixture: GaussianMixture) -> GaussianMixture:
         """A mixture of these parts as its densities tell which model fits a shape.
@@ -129,9 +133,9 @@ def learn_parts(
         return PartMixture(fit_mixture(samples, shares, n_segments, covariance_type, seed, step), None, None)
     alone = len(poses) == 1 or of_one_mesh([pose.pose for pose in poses])
     meshes = [poses] if alone else [[pose] for pose in poses]
-    axes = _principal_axes(training)
+    axes = principal_axes(training)
     step = progress.part(0.0, FOUND, "parts")
-    kinds, were_known = _kinds_of(meshes, training.standardizer, axes, n_segments, rest, cache, step)
+    kinds, were_known = kinds_of(meshes, training.standardizer, axes, n_segments, rest, cache, step)
     if covariance_type == "auto":
         covariance_type = "tied" if alone else "shared"
     usual = min(COMPONENTS_OF_MESH, COMPONENTS_OF_POSE * len(poses)) if alone else COMPONENTS_OF_BODIES
@@ -139,13 +143,13 @@ def learn_parts(
     step = progress.part(0.0 if were_known else FOUND, 1.0, "mixture")
     kind_of_samples = _kinds_of_samples(kinds.of_faces, meshes, training, kinds.count)
     found = after = np.bincount(kind_of_samples, training.shares, kinds.count).astype(np.float64)
-    mixture, kind = _fitted_inside(training, kind_of_samples, axes, count, covariance_type)
+    mixture, kind = fitted_inside(training, kind_of_samples, axes, count, covariance_type)
     if alone:
         step(0.2)
         moved = _mean_posteriors(poses, training.standardizer, mixture, kind, kinds.count).argmax(axis=1)
         kind_of_samples = _kinds_of_samples([moved], meshes, training, kinds.count)
         after = np.bincount(kind_of_samples, training.shares, kinds.count).astype(np.float64)
-        mixture, kind = _fitted_inside(training, kind_of_samples, axes, count, covariance_type)
+        mixture, kind = fitted_inside(training, kind_of_samples, axes, count, covariance_type)
     if len(mixture.weights) < n_segments:
         raise TooFewSamplesError(n_segments, len(mixture.weights))
     step(0.8)
@@ -160,7 +164,7 @@ def learn_parts(
     return PartMixture(mixture, tree, None if kinds.traits is None else kinds.traits.of_kinds(kind_of_groups))
 
 
-def _principal_axes(training: TrainingSamples) -> FloatArray:
+def principal_axes(training: TrainingSamples) -> FloatArray:
     """(d, AXES) principal axes of the standardized signatures, divided by a power of their variance."""
     samples = training.standardized
     variances, axes = np.linalg.eigh((samples * training.shares[:, None]).T @ samples)
@@ -168,7 +172,7 @@ def _principal_axes(training: TrainingSamples) -> FloatArray:
     return np.asarray(axes[:, chosen] / (np.maximum(variances[chosen], 0) + LEAST_VARIANCE) ** WHITENING)
 
 
-def _kinds_of(
+def kinds_of(
     meshes: Sequence[Sequence[Workpiece]],
     standardizer: Standardizer,
     axes: FloatArray,
@@ -222,7 +226,7 @@ def _kinds_of_samples(
     return kind_of_samples
 
 
-def _fitted_inside(
+def fitted_inside(
     training: TrainingSamples, kind_of_samples: IntArray, axes: FloatArray, count: int, covariance_type: CovarianceType
 ) -> tuple[GaussianMixture, IntArray]:
     """Mixture of about `count` components, each the samples of a cluster inside one kind; and (K,) their kinds.

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ..mesh.triangle_mesh import FloatArray, IntArray
+from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ..message import Message
 from ..poses.pose_cache import Workpiece
 from ..spectral.laplacian import unit_area_masses
@@ -82,6 +82,18 @@ class TrainingSamples:
             signature, shares, effective(parameters, "scaling"), unit_spread=parameters["preset"] == "paper"
         )
         return cls(signature, shares, index, vertex, standardizer, standardizer.transform(signature, np.float64))
+
+    def only(self, chosen: BoolArray) -> TrainingSamples:
+        """Some of the samples, with the same standardizer; their shares sum to 1 again."""
+        shares = self.shares[chosen]
+        return replace(
+            self,
+            signature=self.signature[chosen],
+            shares=shares / shares.sum(),
+            pose=self.pose[chosen],
+            vertex=self.vertex[chosen],
+            standardized=self.standardized[chosen],
+        )
 
     @property
     def n_poses(self) -> int:

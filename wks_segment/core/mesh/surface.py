@@ -104,6 +104,17 @@ class Surface:
         """(m, k) area-weighted means over the original faces, of (n', k) values at the vertices of the surface."""
         return np.asarray(self._face_means @ values)
 
+    def from_faces(self, values: FloatArray) -> FloatArray:
+        """(n', k) area-weighted means around the vertices of the surface, of (m, k) values at the original faces.
+
+        Faces that close a hole count as 0.
+        """
+        own, areas = self.face_of >= 0, self.mesh.face_areas
+        entries = np.repeat(areas[own], 3), (self.mesh.faces[own].ravel(), np.repeat(self.face_of[own], 3))
+        sums = csr_matrix(entries, shape=(self.mesh.n_vertices, self.original.n_faces))
+        total = np.bincount(self.mesh.faces.ravel(), np.repeat(areas, 3), self.mesh.n_vertices)
+        return np.asarray(sums @ values / np.maximum(total, np.finfo(float).tiny)[:, None])
+
     @cached_property
     def _face_means(self) -> csr_matrix:
         """(m, n') matrix that takes the area-weighted mean over each original face."""
