@@ -38,7 +38,7 @@ def draft(
     connections: Sequence[Connection],
     progress: Progress | None = None,
 ) -> list[IntArray] | None:
-    """Provisional segments of poses; None if the meshes are too broken for a draft.
+    """Provisional segments of poses; None if the meshes are too broken for it, or it finds no parts.
 
     Parameters
     ----------
@@ -55,9 +55,11 @@ def draft(
     """
     progress = (progress or Progress()).titled("First colors")
     try:
-        return _drafted(model, meshes, connections, progress)
+        labels = _drafted(model, meshes, connections, progress)
     except (ValueError, SpectrumError, MemoryError, LinAlgError):
         return None
+    # One color for everything tells nothing.
+    return labels if any(len(np.unique(of_mesh)) > 1 for of_mesh in labels) else None
 
 
 def _drafted(
