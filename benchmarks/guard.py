@@ -25,7 +25,8 @@ from benchmarks import shapes
 from benchmarks.counting import Counter, Counts
 from wks_segment.blender.workflow.live_session import session_of
 from wks_segment.blender.workflow.report import Report
-from wks_segment.core import PoseSegmentation, TriangleMesh
+from wks_segment.core import PoseSegmentation, TriangleMesh, connect
+from wks_segment.core.draft.segments import draft
 from wks_segment.core.progress import Progress
 
 KEPT = Path(__file__).with_name("guard_counts.json")
@@ -71,7 +72,7 @@ def main() -> None:
 def count_all() -> Counts:
     """Counts of all jobs, each by "job: stage"."""
     counts: Counts = {}
-    for job in (learn_poses, learn_bodies, learn_as_the_paper, describe_exactly):
+    for job in (learn_poses, learn_bodies, learn_as_the_paper, describe_exactly, first_colors):
         bpy.ops.wm.read_homefile(use_empty=True)
         session_of(bpy.context).cache.clear()
         bpy.context.scene.wks_segment.live = False
@@ -129,6 +130,14 @@ def describe_exactly(counts: Counts) -> None:
     """One body with the exact eigensolver."""
     with counting(counts, "exact eigenpairs"):
         PoseSegmentation(n_eigenpairs=FEW_PAIRS, accuracy="exact").describe(shapes.body(BODIES[0]))
+
+
+def first_colors(counts: Counts) -> None:
+    """A draft of three poses of one mesh."""
+    poses = [shapes.body(LEARNED, bend=0.3 * i) for i in range(3)]
+    connection = connect(*poses)
+    with counting(counts, "first colors"):
+        draft(PoseSegmentation(), poses, [connection] * len(poses))
 
 
 def add(mesh: TriangleMesh, name: str) -> None:

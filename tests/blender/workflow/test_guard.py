@@ -103,6 +103,7 @@ def test_kept_counts_are_of_the_present_jobs():
         "apply to a body",
         "learn as the paper",
         "exact eigenpairs",
+        "first colors",
     }
     for needed in ("learn: mixture", "learn: signature", "live: label", "apply: signature"):
         assert sum(stages[needed].values()) > 1000
