@@ -14,12 +14,12 @@ PYTEST := pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --max-worker-
 # What depends on the version of Blender, and a little of the core for its NumPy; the rest has been tested on the newest.
 ON_OLDEST := tests/blender tests/core/test_estimator.py tests/core/test_model_file.py \
 	tests/core/spectral/test_signature.py tests/core/learning/test_gaussian_mixture.py \
-	$(addprefix --ignore tests/blender/,parts workflow/test_sides.py workflow/test_model_ranking.py \
+	$(addprefix --ignore tests/blender/,parts workflow/test_sides.py workflow/test_guard.py workflow/test_model_ranking.py \
 	test_installed_zip.py cli/test_recipes.py cli/test_command_batch.py)
 # Wheels only, and no byte code before it is needed.
 PIP := -m pip install --quiet --disable-pip-version-check --only-binary :all: --no-compile
 
-.PHONY: help install install-oldest demo test test-oldest test-window screenshots fuzz lint zip docs clean
+.PHONY: help install install-oldest demo test test-oldest test-window guard screenshots fuzz lint zip docs clean
 
 help:  ## list the commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
@@ -39,6 +39,9 @@ test-oldest: $(OLDEST)/.ready  ## on the oldest Blender that is supported, what 
 
 test-window: $(VENV)/.ready  ## a real Blender 5.2 and 4.3, with mouse and keyboard (root; 4.4 GB in BLENDERS=window)
 	WKS_SEGMENT_WINDOW="$(abspath $(BLENDERS))" $(RUN) -m pytest tests/window
+
+guard: $(VENV)/.ready  ## fails if a stage of a small job has more to do than before (counts, not seconds)
+	$(THREADS) $(RUN) -m benchmarks.guard
 
 screenshots: $(VENV)/.ready  ## the pictures of the docs that show the window, from a real Blender
 	WKS_SEGMENT_WINDOW="$(abspath $(BLENDERS))" $(RUN) -m scripts.screenshots

@@ -1,7 +1,7 @@
 """Duration of each stage of a job: `python -m benchmarks.job [--vertices 10000] [--poses 5] [--workers 1]`.
 
-Makes objects of one body in several poses, learns parts from them and writes labels, as Learn and Segment does. Prints
-one line of JSON: wall and CPU seconds of each stage.
+Makes objects of one body in several poses, learns parts from them and writes labels, as Learn and Segment does in a
+window, which shows first colors. Prints one line of JSON: wall and CPU seconds of each stage.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from wks_segment.blender.workflow import describing, pipeline
 from wks_segment.blender.workflow.describing import Run
 from wks_segment.blender.workflow.pipeline import LabelRequest
 from wks_segment.blender.workflow.report import Report
+from wks_segment.core.draft.segments import draft
 from wks_segment.core.poses import describe
 
 
@@ -74,7 +75,10 @@ def run() -> dict[str, dict[str, float]]:
 
     model = settings.new_model()
     poses = timed("read", read_training_poses, bpy.context, settings, Report([]))
-    described = timed("connect, eigenpairs, signature", describing.describe, model, poses, job)
+    prepared = timed("connect", describing.prepare, model, poses, job)
+    connections = [prepared.connections[i] for i in prepared.originals]
+    timed("first colors", draft, model, [pose.mesh for pose in poses], connections)
+    described = timed("eigenpairs, signature", describing.describe, model, poses, job, prepared)
     timed("mixture", model.fit, described)
     request = timed("read meshes", LabelRequest.of, settings, [pose.character for pose in poses])
     labels = timed("label", pipeline.label, model, poses, described, request, job)

@@ -28,7 +28,7 @@ LAYERS = {
         {"user_labels"},
         {"model_file"},
         {"segmentation"},
-        {"ranking"},
+        {"draft", "ranking"},
     ],
     "blender": [
         {"errors", "streams"},

@@ -212,6 +212,24 @@ def job_is_over():
     return not job_runs()
 
 
+def first_colors():
+    """Number of triangles that are drawn in provisional colors."""
+    return len(bpy.context.window_manager.wks_segment_first_colors.preview.corners) // 3
+
+
+def subdivide(name):
+    """Give an object four times its faces, so that learning it takes long."""
+    obj = bpy.data.objects[name]
+    with bpy.context.temp_override(window=_window(), area=_view3d(), region=_region("WINDOW")):
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.mesh.select_all(action="SELECT")
+        bpy.ops.mesh.subdivide()
+        bpy.ops.object.mode_set(mode="OBJECT")
+        bpy.ops.ed.undo_push(message="Subdivide")
+    yield from settle()
+    return len(obj.data.polygons)
+
+
 def n_segments(name, count):
     """Whether an object has a number of segments."""
     return len(segments(name)) == count

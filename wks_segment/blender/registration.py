@@ -51,6 +51,7 @@ from .ui.translations import TRANSLATIONS
 from .ui.viewport_colors import VIEWPORT_COLORS, ViewportColors
 from .workflow.active_object import ACTIVE_OBJECT, ActiveObject
 from .workflow.background_job import JOB_HOLDER, JobHolder
+from .workflow.first_colors import FIRST_COLORS, FirstColors
 from .workflow.live_session import SESSION, Session
 from .workflow.property_changes import PropertyChanges
 
@@ -125,6 +126,7 @@ def register() -> None:
     setattr(bpy.types.WindowManager, JOB_HOLDER, JobHolder())
     session = Session(ViewportPreview())
     setattr(bpy.types.WindowManager, SESSION, session)
+    setattr(bpy.types.WindowManager, FIRST_COLORS, FirstColors(ViewportPreview()))
     setattr(bpy.types.WindowManager, ACTIVE_OBJECT, ActiveObject(lambda: session.follow(bpy.context.scene)))
     setattr(bpy.types.WindowManager, VIEWPORT_COLORS, ViewportColors())
     setattr(bpy.types.WindowManager, COLOR_ICONS, ColorIcons())
@@ -138,7 +140,7 @@ def unregister() -> None:
     bpy.utils.unregister_cli_command(_commands.pop())
     bpy.types.VIEW3D_MT_object.remove(menu.draw_in_object_menu)
     bpy.app.translations.unregister(__name__)
-    for name in (COLOR_ICONS, VIEWPORT_COLORS, ACTIVE_OBJECT, SESSION, JOB_HOLDER):
+    for name in (COLOR_ICONS, VIEWPORT_COLORS, ACTIVE_OBJECT, FIRST_COLORS, SESSION, JOB_HOLDER):
         getattr(bpy.types.WindowManager, name).close()
         delattr(bpy.types.WindowManager, name)
     del bpy.types.Scene.wks_segment

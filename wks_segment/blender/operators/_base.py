@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from typing import ClassVar, Generic, Protocol, TypeVar
 
 import bpy
@@ -22,6 +23,7 @@ from ..ui.messages import in_panel
 from ..workflow import pipeline
 from ..workflow.all_or_nothing import all_or_nothing
 from ..workflow.background_job import BackgroundJob, job_holder
+from ..workflow.first_colors import first_colors_of
 from ..workflow.live_session import session_of
 from ..workflow.passing_message import redraw_sidebars
 from ..workflow.segmentation_job import SegmentationJob
@@ -175,8 +177,12 @@ class JobOperator(BaseOperator, Generic[J]):
 
     def start_thread(self, context: bpy.types.Context) -> None:
         """Read, and start to compute in a thread."""
-        self.job = self.read_and_check(context)
+        self.job = self.in_thread(self.read_and_check(context))
         self.thread_job = job_holder(context).start(self.bl_label, self.job.compute, self.job.guard.check_quickly)
+
+    def in_thread(self, job: J) -> J:
+        """The job as it is computed in a thread, while somebody looks on."""
+        return job
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Called for every event in the window; all but ESC and the timer are passed on."""
@@ -258,6 +264,27 @@ class LabelOperator(JobOperator[SegmentationJob]):
         if not self.is_adjusted or last is None or last.learns != self.learns:
             return None
         return last.with_settings(context.scene.wks_segment)
+
+    def in_thread(self, job: SegmentationJob) -> SegmentationJob:
+        """The job, with a draft for whoever waits, if the result is shown as colors."""
+        return replace(job, drafts=job.request.outputs.colors)
+
+    def step(self, context: bpy.types.Context) -> set[str]:
+        """Look after the job, and show its draft until it ends."""
+        colors, result = first_colors_of(context), {"CANCELLED"}
+        try:
+            result = super().step(context)
+        finally:
+            if result != {"PASS_THROUGH"} or self.thread_job.ending:
+                colors.hide()
+        if result == {"PASS_THROUGH"} and not self.thread_job.ending and session_of(context).proposed is None:
+            colors.follow(context, self.job.draft)
+        return result
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Called by Blender when the window is closed."""
+        first_colors_of(context).hide()
+        super().cancel(context)
 
     def write_result(self, context: bpy.types.Context) -> set[str]:
         """Write the labels and report them."""

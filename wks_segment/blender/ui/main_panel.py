@@ -10,6 +10,7 @@ import bpy
 
 from ..props.presets import WKS_SEGMENT_PT_presets
 from ..workflow.background_job import job_holder
+from ..workflow.first_colors import PROVISIONAL, first_colors_of
 from ..workflow.live_session import session_of
 from .messages import in_panel
 from .status import job_texts, status
@@ -88,6 +89,9 @@ class _Sidebar:
         else:
             stage, left = job_texts(job)
             lines = wrapped_lines(stage)
+            if first_colors_of(context).shown:
+                told = wrapped(PROVISIONAL)
+                lines = [*lines[: STATUS_LINES - 1 - len(told)], *told]
             first.progress(factor=job.share, text=left)
             first.operator("wks_segment.cancel", text="", icon="CANCEL")
         for line in [*lines, *[""] * (STATUS_LINES - 1 - len(lines))]:

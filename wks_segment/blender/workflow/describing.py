@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
@@ -14,9 +14,11 @@ from ...core import (
     PoseSignature,
     SpectrumError,
     SpectrumWarning,
+    TriangleMesh,
     Workpiece,
     connect,
 )
+from ...core.mesh.triangle_mesh import IntArray
 from ...core.message import Message, message_of
 from ...core.poses.describe import LABELING, Duration
 from ...core.progress import Progress
@@ -39,12 +41,15 @@ class Run:
         Signatures computed earlier; new ones are added.
     workers : int, optional
         Threads that describe poses at the same time, see `PoseSegmentation.describe_all`.
+    on_draft : callable, optional
+        Called with a draft of the labels, by `pipeline.learn` if it takes so long that somebody would look at it.
     """
 
     report: Report
     progress: Progress = field(default_factory=Progress)
     cache: Cache | None = None
     workers: int | None = None
+    on_draft: Callable[[list[IntArray]], None] | None = None
 
     def with_progress(self, progress: Progress) -> Run:
         """The same with another progress, usually a part of this one."""
@@ -71,8 +76,15 @@ class Prepared:
 
     def describing_share(self, model: PoseSegmentation, poses: Sequence[Pose], rest: Duration) -> float:
         """Share of the time of a job that is spent on signatures; see `PoseDescriber.describing_share`."""
-        new = [poses[i].mesh for i, signature in self.known.items() if signature is None]
-        return model.describing_share(new, len(self.known), rest)
+        return model.describing_share(self._new(poses), len(self.known), rest)
+
+    def seconds(self, model: PoseSegmentation, poses: Sequence[Pose], rest: Duration) -> float:
+        """Estimate of the seconds of a processor that a job takes; 0 if all signatures are known."""
+        share = self.describing_share(model, poses, rest)
+        return model.describing_seconds(self._new(poses)) / share if share > 0 else 0.0
+
+    def _new(self, poses: Sequence[Pose]) -> list[TriangleMesh]:
+        return [poses[i].mesh for i, signature in self.known.items() if signature is None]
 
 
 def prepare(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> Prepared:

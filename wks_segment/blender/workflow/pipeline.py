@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...core import PartNotes, PoseSegmentation, Workpiece
+from ...core.draft.segments import SECONDS, draft
 from ...core.learning.taught_parts import UnlikePartsError
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ...core.message import Message, message_of
@@ -33,15 +34,15 @@ from ..scene.characters import Character, polygon_ranges, vertex_ranges
 from ..scene.mesh_arrays import Body
 from ..scene.poses import Pose
 from . import carry_over, model_library, segment_list
-from .describing import Run, describe, prepare
+from .describing import Prepared, Run, describe, prepare
 from .report import Report
 from .teaching import Lesson
 
 SEGMENT_SHARE = 0.6
 """Share of the labeling progress that is spent on segments; the rest tells left from right. A wrong share only makes
 the progress bar uneven."""
-
-
+DRAFT_ABOVE = 4.0
+"""Estimated seconds of a job above which it begins with a draft: before, the segments themselves are there soon."""
 TAUGHT_MIN_SHARE = 0.2
 """How much smaller a region of a taught part may be than *Smallest Part* says: a paw of a fox has 0.5 % of the area,
 and is wanted if it was taught."""
@@ -117,6 +118,7 @@ def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run, lesson: Less
             segments=model.n_segments,
         )
     prepared = prepare(model, poses, run)
+    run = _draft(model, poses, run, prepared)
     share = prepared.describing_share(model, poses, LEARNING)
     described = describe(model, poses, run.with_progress(run.progress.part(0.0, share)), prepared)
     progress = run.progress.part(share, 1.0).titled("Learning the segments")
@@ -155,6 +157,35 @@ def _fit_to(lesson: Lesson, model: PoseSegmentation, described: Sequence[Workpie
         else:
             model.part_notes_ = PartNotes(names=dict(enumerate(lesson.names)))
             return
+
+
+def _draft(model: PoseSegmentation, poses: Sequence[Pose], run: Run, prepared: Prepared) -> Run:
+    """Hand a draft of each pose's labels on, if the job is long; the run with the progress that is left."""
+    seconds = prepared.seconds(model, poses, LEARNING)
+    if run.on_draft is None or seconds < DRAFT_ABOVE:
+        return run
+    # The draft takes part in nothing that follows: the result is the same without it.
+    distinct, share = list(prepared.known), SECONDS / (SECONDS + seconds)
+    with run.report.stage("draft"):
+        meshes, connections = [poses[i].mesh for i in distinct], list(prepared.connections.values())
+        labels = draft(model, meshes, connections, run.progress.part(0.0, share))
+    if labels is not None:
+        of_distinct = dict(zip(distinct, labels, strict=True))
+        run.on_draft(
+            [
+                _most_common(of_distinct[original], pose.polygon_of)
+                for pose, original in zip(poses, prepared.originals, strict=True)
+            ]
+        )
+    return run.with_progress(run.progress.part(share, 1.0))
+
+
+def _most_common(of_triangles: IntArray, polygon_of: IntArray) -> IntArray:
+    """(p,) label that most triangles of each polygon have; -1 for a polygon without a triangle."""
+    own = polygon_of >= 0
+    table = np.zeros((int(polygon_of.max()) + 1, int(of_triangles.max()) + 1), dtype=np.int64)
+    np.add.at(table, (polygon_of[own], of_triangles[own]), 1)
+    return np.asarray(np.where(table.any(axis=1), table.argmax(axis=1), -1))
 
 
 def label(

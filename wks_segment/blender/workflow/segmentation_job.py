@@ -81,6 +81,10 @@ class SegmentationJob:
         The part of each polygon of each character, once computed.
     lesson : Lesson, optional
         The parts that the model is taught, if it learns named ones.
+    drafts : bool
+        Whether to begin with a draft, if the job is long and learns.
+    draft
+        A provisional part of each polygon of each character, once there is one, to be shown and never written.
     """
 
     model: PoseSegmentation
@@ -99,6 +103,8 @@ class SegmentationJob:
     first: SegmentationJob | None = None
     labels: dict[Character, IntArray] = field(default_factory=dict)
     lesson: Lesson | None = None
+    drafts: bool = False
+    draft: dict[Character, IntArray] = field(default_factory=dict)
     _weights: dict[Character, dict[int, FloatArray]] | None = None
 
     @classmethod
@@ -276,13 +282,22 @@ class SegmentationJob:
         """Describe the poses, and learn from them if asked to; the progress of the rest."""
         run = Run(self.report, progress, self.cache)
         if self.learns:
-            run = run.with_progress(progress.part(0.0, LEARN_SHARE))
+            run = replace(
+                run, progress=progress.part(0.0, LEARN_SHARE), on_draft=self._keep_draft if self.drafts else None
+            )
             self.described = pipeline.learn(self.model, self.poses, run, self.lesson)
             if self.lesson is not None:
                 self.take_number()
             return progress.part(LEARN_SHARE, 1.0)
         self.described, rest = describing.describe_to_label(self.model, self.poses, run)
         return rest
+
+    def _keep_draft(self, labels: list[IntArray]) -> None:
+        """Keep a draft for Blender's thread, which shows it."""
+        of_poses = zip(self.poses, labels, strict=True)
+        self.draft = {
+            pose.character: pipeline.filled(parts, self.request.bodies[pose.character]) for pose, parts in of_poses
+        }
 
     def write(self) -> None:
         """Write the labels, and a learned model; ChangedError, and nothing written, if the scene changed."""

@@ -157,10 +157,13 @@ class PoseDescriber:
         """
         if not new:
             return 0.0
-        sizes = [self._n_refined(mesh) for mesh in new]
-        seconds = sum(seconds_needed(size, self.n_eigenpairs, self.accuracy) for size in sizes)
-        signatures = SIGNATURE_START * len(new) + SIGNATURE_FACTOR * seconds
+        signatures, sizes = self.describing_seconds(new), [self._n_refined(mesh) for mesh in new]
         return signatures / (signatures + rest.of(n_poses, float(np.mean(sizes))))
+
+    def describing_seconds(self, meshes: Sequence[TriangleMesh]) -> float:
+        """Rough estimate of the seconds of a processor that the signatures of poses take."""
+        seconds = sum(seconds_needed(self._n_refined(mesh), self.n_eigenpairs, self.accuracy) for mesh in meshes)
+        return SIGNATURE_START * len(meshes) + SIGNATURE_FACTOR * seconds
 
     @one_blas_thread  # poses run in parallel instead: matrices this narrow gain nothing from more threads
     def describe_all(

@@ -60,6 +60,8 @@ GERMAN_MESSAGES = {
     "{name}, rest position": "{name}, Ruhepose",
     "Learning the segments": "Segmente werden gelernt",
     'Segments of "{character}"': 'Segmente von "{character}"',
+    "First colors": "Erste Farben",
+    "First colors: provisional, nothing is written yet": "Erste Farben: vorläufig, noch ist nichts geschrieben",
     'Left and right of "{character}"': 'Links und rechts von "{character}"',
     'Weights of "{character}"': 'Gewichte von "{character}"',
     'ID map of "{name}"': 'ID-Map von "{name}"',
