@@ -235,7 +235,7 @@ class Labeler:
     def regions_of(
         self, n_groups: int, poses: Sequence[Workpiece], progress: Progress
     ) -> tuple[list[Regions], list[Traits]]:
-        """Connected regions of groups on each pose, which are the same object for poses of one mesh, and their traits."""
+        """Connected regions of groups on each pose, and their traits; poses of one mesh share the object."""
         of_poses: list[Regions] = []
         traits: list[Traits] = []
         for together, step in _steps(poses, progress):

@@ -1,4 +1,4 @@
-"""Left and right of taught parts: which part of a pair is on the left, and which half of a group each face belongs to."""
+"""Left and right of taught parts: which part of a pair is on the left, and in which half of a group each face lies."""
 
 from __future__ import annotations
 
@@ -59,9 +59,7 @@ def _distances(centers: FloatArray, left: IntArray, right: IntArray, g: int, h: 
     return float(straight), float(np.linalg.norm(a - d) + np.linalg.norm(b - c))
 
 
-def sides_by_labels(
-    region: IntArray, count: int, taught: TaughtParts, labels: IntArray, areas: FloatArray
-) -> IntArray:
+def sides_by_labels(region: IntArray, count: int, taught: TaughtParts, labels: IntArray, areas: FloatArray) -> IntArray:
     """(r,) side of each region by the taught left and right parts on it; `UNKNOWN_SIDE` if none is on it.
 
     Parameters
@@ -103,4 +101,3 @@ def halves(field: FloatArray, labels: IntArray, neighbors: FaceAdjacency, areas:
     mean = np.bincount(region, weights * field, count) / np.bincount(region, weights, count)
     clear = np.abs(mean) > CLEAR_SIDE
     return np.where(np.where(clear, mean, 0.0)[region] + np.where(clear[region], 0.0, field) < 0, -1, 1)
-
