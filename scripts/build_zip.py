@@ -63,6 +63,7 @@ TARGETS = {
 }
 
 README = "README.md"
+MODELS = f"{PACKAGE}/models/"
 REQUIRED_FILES = ("__init__.py", MANIFEST, "LICENSE")
 FILE_TYPES = {".py", ".toml", ".md", ".whl", ".json", ".npz", ".png", ".svg", ".typed"}
 FORBIDDEN_FOLDERS = {"__pycache__", "test", "tests"}
@@ -221,6 +222,8 @@ def wheel_faults(filenames: Sequence[str], platform: str, pythons: Sequence[str]
 def file_faults(files: Sequence[str]) -> list[str]:
     """Required files that are missing, and files that do not belong in the ZIP."""
     faults = [f"{name} is missing" for name in REQUIRED_FILES if name not in files]
+    if not any(name.startswith(MODELS) and name.endswith(".json") for name in files):
+        faults.append(f"there is no starter model in {MODELS}")
     for path in map(PurePosixPath, sorted(files)):
         if FORBIDDEN_FOLDERS & set(path.parts[:-1]):
             faults.append(f"{path} does not belong in the ZIP")

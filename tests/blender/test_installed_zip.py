@@ -41,6 +41,7 @@ LINUX_WHEELS = [
     for python, tag in (("3.11", "cp311"), ("3.13", "cp313"))
     for name, version in build_zip.COMPILED[python].items()
 ]
+MODEL = "wks_segment/models/human.json"
 SCIPY_313 = next(name for name in LINUX_WHEELS if name.startswith("scipy") and "cp313" in name)
 
 
@@ -50,7 +51,7 @@ def write_zip(path, packed, listed=None, files=(), platforms=("linux-x64",)):
     with zipfile.ZipFile(path, "w") as archive:
         manifest = f"platforms = {list(platforms)}\nwheels = {wheels}\n"
         archive.writestr("blender_manifest.toml", manifest)
-        for name in ("__init__.py", "LICENSE", *(f"wheels/{name}" for name in packed), *files):
+        for name in ("__init__.py", "LICENSE", MODEL, *(f"wheels/{name}" for name in packed), *files):
             archive.writestr(name, "")
     return path
 
@@ -70,6 +71,17 @@ def test_the_readme_of_the_zip_has_no_link_that_leads_nowhere(tmp_path):
     assert "![" not in text
     assert text.split()[:40] == whole.split("![")[0].split()[:40]
     assert "The five-minute tutorial goes through it slowly." in text.replace("\n", " ")
+
+
+def test_the_zip_contains_the_starter_models(tmp_path):
+    target = tmp_path / "extension"
+    target.mkdir()
+    build_zip.stage(ROOT, target, "linux-x64", [])
+    shipped = {path.name for path in (ROOT / "wks_segment" / "models").glob("*.json")}
+    assert {path.name for path in (target / "wks_segment" / "models").iterdir()} >= shipped > set()
+    assert build_zip.file_faults(["__init__.py", "blender_manifest.toml", "LICENSE"]) == [
+        "there is no starter model in wks_segment/models/"
+    ]
 
 
 def test_complete_zip_has_no_fault(tmp_path):

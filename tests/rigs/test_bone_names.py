@@ -114,6 +114,8 @@ def test_a_bone_named_as_its_limb_is_the_part_that_is_missing():
     assert names(toon) == {"Left leg": "Thigh", "Left knee": "Shin", "Left ankle": "Foot"}
     arm = {"LeftArm": None, "LeftForeArm": "LeftArm", "LeftHand": "LeftForeArm"}
     assert names(arm) == {"LeftArm": "Upper Arm", "LeftForeArm": "Forearm", "LeftHand": "Hand"}
+    joints = {"Hip_L": None, "Knee_L": "Hip_L", "Clavicle_L": None, "Shoulder_L": "Clavicle_L", "Elbow_L": "Shoulder_L"}
+    assert list(names(joints).values()) == ["Thigh", "Shin", "Shoulder", "Upper Arm", "Forearm"]
     assert names({"body": None, "leg_L": "body"}) == {"body": "Torso", "leg_L": "Leg"}
 
 

@@ -9,20 +9,21 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from copy import copy
 from dataclasses import replace
+from functools import partial
 from os import PathLike
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 from . import model_file
 from .labeling.pose_labeling import PoseLabeling
 from .labeling.region_atlas import RegionAtlas
-from .labeling.taught_labels import recognized_taught_parts
+from .labeling.taught_labels import learned_lesson, lesson_of
 from .learning.gaussian_mixture import CovarianceType
 from .learning.likelihood import comparable_score, usual_scores
 from .learning.parameters import Estimator, NSegments, Preset, check_parameters, effective
 from .learning.part_mixture import PartMixture, learn_parts
 from .learning.standardizer import Scaling, Standardizer
 from .learning.taught_mixture import learn_taught_parts
-from .learning.taught_parts import TaughtLabels, Unlabeled, UnlikePartsError, checked_labels
+from .learning.taught_parts import Unlabeled
 from .learning.training_samples import TrainingSamples
 from .mesh.surface import IslandMode
 from .mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
@@ -198,18 +199,19 @@ class PoseSegmentation(PoseLabeling, Estimator):
         if not meshes:
             raise ValueError("there is no pose to learn from: pass at least one mesh, better three to five")
         overall, parameters = Progress.of(progress), self.get_params()
-        taught = None if labels is None else self._checked_labels(labels, meshes, unlabeled)
+        lesson = None if labels is None else lesson_of(labels, meshes, unlabeled, self.preset)
         poses, described = self._all_described(meshes, overall, cache)
         overall = overall.part(described, 1.0)
         overall(0.0, "parts")
         training, step = TrainingSamples.of(poses, parameters), overall.part(0.0, GROUPED)
         atlases = None
-        if taught is not None:
-            lesson = TaughtLabels(taught, unlabeled)
-            learned, atlases = self._taught(lesson, poses, training, rest, cache, overall.part(0.0, RECOGNIZED))
+        if lesson is not None:
+            learn = partial(learn_taught_parts, parameters, poses, training=training, rest=rest, cache=cache)
+            labeler_of = partial(self._labeler_of, standardizer=training.standardizer)
+            learned, atlases = learned_lesson(lesson, learn, labeler_of, poses, rest, overall.part(0.0, RECOGNIZED))
         else:
             learned = learn_parts(parameters, poses, training, rest, cache, step)
-        if taught is None and learned.grouping is not None:
+        if lesson is None and learned.grouping is not None:
             learned, atlases = self._recognized(
                 learned, training.standardizer, poses, rest, overall.part(GROUPED, RECOGNIZED)
             )
@@ -389,42 +391,6 @@ class PoseSegmentation(PoseLabeling, Estimator):
                 break  # the tree that is returned is the one that the atlases are of
             learned = replace(learned, grouping=learned.grouping.without(lost[-1], labeler.n_segments))
         return learned, atlases
-
-    def _taught(
-        self, lesson: TaughtLabels, poses: Sequence[Workpiece], training: TrainingSamples, rest: TriangleMesh | None,
-        cache: Cache | None, progress: Progress,
-    ) -> tuple[PartMixture, tuple[RegionAtlas, RegionAtlas]]:  # fmt: skip
-        """Parts that were taught, and their regions; two alike ones that are no left and right are learned apart.
-
-        Raises
-        ------
-        UnlikePartsError
-            If a part is not found again all the same.
-        """
-        while True:
-            step = progress.part(0.0, GROUPED / RECOGNIZED)
-            learned = learn_taught_parts(self.get_params(), poses, lesson, training, rest, cache, step)
-            of_labels = self._labeler_of(learned, training.standardizer)
-            step = progress.part(GROUPED / RECOGNIZED, 1.0)
-            try:
-                return recognized_taught_parts(of_labels, learned, poses, lesson, rest, step)
-            except UnlikePartsError as error:
-                if learned.taught is None or not learned.taught.has_pair(*error.parts):
-                    raise
-                lesson = replace(lesson, apart=lesson.apart | {error.parts})
-
-    def _checked_labels(
-        self, labels: Sequence[IntArray | None], meshes: Sequence[AnyPose], unlabeled: Unlabeled
-    ) -> list[IntArray]:
-        """For each mesh the taught part of each face; ValueError if the labels do not fit, or cannot be learned."""
-        if self.preset == "paper":
-            raise ValueError(
-                'parts are taught with preset="default": with the paper\'s setting each component is a part'
-            )
-        if unlabeled not in get_args(Unlabeled):
-            raise ValueError(Message('unlabeled must be "learn" or "ignore", not {value!r}', value=unlabeled))
-        originals = [mesh if isinstance(mesh, TriangleMesh) else mesh.surface.original for mesh in meshes]
-        return checked_labels(as_list(labels, "labels"), [mesh.n_faces for mesh in originals])
 
     def _check_parameters(self) -> None:
         check_parameters(self.get_params())

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .dictionary import ABOVE, FILLERS, LOWER_OF, PLAIN_NAMES, UPPER_OF
+from .dictionary import ABOVE, FILLERS, LOWER_OF, NAMED_BY_JOINT, PLAIN_NAMES, UPPER_OF
 
 NO_SIDE, LEFT_SIDE, RIGHT_SIDE = 0, 1, 2
 """Sides, numbered as the parts of a mesh number them."""
@@ -80,10 +80,13 @@ def plain_names(bones: Sequence[str], parents: Sequence[int]) -> list[BoneName]:
         if parent >= 0:
             children[parent].append(bone)
     for i, named in enumerate(names):
+        below = {names[child].name for child in children[i]}
+        joint = NAMED_BY_JOINT.get(named.name)
+        if joint is not None and named.side and joint[0] in below:
+            names[i] = named = BoneName(joint[1], named.side, True, named.words)
         if named.name not in UPPER_OF:
             continue
         above = names[parents[i]].name if parents[i] >= 0 else ""
-        below = {names[child].name for child in children[i]}
         upper, lower = UPPER_OF[named.name], LOWER_OF[named.name]
         if above in (upper, named.name):
             names[i] = BoneName(lower if above == upper else named.name, named.side, True, named.words)

@@ -25,7 +25,10 @@ PLAIN_NAMES: dict[str, str] = {
     "orbicularis": "Eye", "oculi": "Brow", "levator": "Cheek", "temporalis": "Head", "special": "Head",
     "cheek": "Cheek", "forehead": "Brow", "temple": "Head", "ear": "Ear", "ears": "Ear",
     "hair": "Hair", "bangs": "Hair", "ponytail": "Hair", "mane": "Mane", "beard": "Beard", "horn": "Horn",
-    "antler": "Horn", "antlers": "Horn", "hat": "Hat", "helmet": "Hat",
+    "antler": "Horn", "antlers": "Horn", "hat": "Hat", "helmet": "Hat", "crown": "Hat", "hood": "Hat", "cap": "Hat",
+    "mandible": "Jaw", "maxilla": "Muzzle", "pupil": "Eye", "iris": "Eye", "eyelash": "Eye", "lash": "Eye",
+    "glasses": "Eye", "ponytails": "Hair", "pigtail": "Hair", "braid": "Hair", "antenna": "Antenna",
+    "antennae": "Antenna", "feeler": "Antenna",
     # torso
     "torso": "Torso", "body": "Torso", "trunk": "Torso", "spine": "Spine", "spines": "Spine", "back": "Back",
     "chest": "Chest", "upperchest": "Chest", "ribcage": "Chest", "ribs": "Chest", "rib": "Chest", "thorax": "Chest",
@@ -34,7 +37,9 @@ PLAIN_NAMES: dict[str, str] = {
     "stomach": "Abdomen", "waist": "Abdomen", "hips": "Hips", "hip": "Hips", "pelvis": "Hips", "butt": "Hips",
     "buttock": "Hips", "glute": "Hips", "cog": "Hips", "root": "Torso", "all": "Torso", "bodylow": "Lower Torso",
     "lowerbody": "Lower Torso", "bodylower": "Lower Torso", "bodyup": "Upper Torso", "upperbody": "Upper Torso",
-    "bodyupper": "Upper Torso", "shell": "Torso",
+    "bodyupper": "Upper Torso", "shell": "Torso", "sternum": "Chest", "withers": "Back", "loin": "Back",
+    "rump": "Hips", "croup": "Hips", "lumbar": "Spine", "vertebra": "Spine", "thoracic": "Spine", "torsolower": "Torso",
+    "torsoupper": "Torso", "backpack": "Held Item",
     # arms
     "shoulder": "Shoulder", "shoulders": "Shoulder", "clavicle": "Shoulder", "collar": "Shoulder",
     "collarbone": "Shoulder", "scapula": "Shoulder", "frontshoulder": "Shoulder", "foreshoulder": "Shoulder",
@@ -50,6 +55,7 @@ PLAIN_NAMES: dict[str, str] = {
     "leg": "Leg", "thigh": "Thigh", "upperleg": "Thigh", "upleg": "Thigh", "legupper": "Thigh", "femur": "Thigh",
     "shin": "Shin", "calf": "Shin", "lowerleg": "Shin", "lowleg": "Shin", "loleg": "Shin", "leglower": "Shin",
     "knee": "Shin", "tibia": "Shin", "crus": "Shin", "midleg": "Knee",
+    "hock": "Foot", "hamstring": "Thigh", "quad": "Thigh", "kneecap": "Shin", "boot": "Foot", "shoe": "Foot",
     "ankle": "Foot", "foot": "Foot", "feet": "Foot", "footback": "Foot", "heel": "Foot", "metatarsal": "Foot",
     "metatarsals": "Foot", "tarsal": "Foot", "paw": "Foot", "hoof": "Foot",
     "toe": "Toes", "toes": "Toes", "toebase": "Toes", "ball": "Toes", "bigtoe": "Toes", "toeend": "Toes",
@@ -69,12 +75,16 @@ PLAIN_NAMES: dict[str, str] = {
     "backshin": "Lower Hind Leg", "hindshin": "Lower Hind Leg", "backfoot": "Hind Paw", "hindfoot": "Hind Paw",
     "rearfoot": "Hind Paw", "backpaw": "Hind Paw", "hindpaw": "Hind Paw", "rearpaw": "Hind Paw", "ffb": "Hind Paw",
     "backtoe": "Hind Paw", "hindtoe": "Hind Paw", "backhoof": "Hind Paw", "hindhoof": "Hind Paw",
+    "stifle": "Upper Hind Leg", "gaskin": "Lower Hind Leg", "backknee": "Lower Hind Leg", "hindknee": "Lower Hind Leg",
+    "frontknee": "Lower Foreleg", "frontelbow": "Lower Foreleg", "frontankle": "Forepaw", "backankle": "Hind Paw",
+    "fetlock": "Foot", "pastern": "Foot", "claw": "Claw", "pincer": "Claw", "talon": "Foot", "tentacle": "Tentacle",
     "midfrontleg": "Front Middle Leg", "midbackleg": "Back Middle Leg", "midfrontfoot": "Front Middle Foot",
     "midbackfoot": "Back Middle Foot", "middleleg": "Middle Leg",
     # tails, wings, clothes
     "tail": "Tail", "tailbase": "Tail", "tailtip": "Tail", "wing": "Wing", "fin": "Fin", "flipper": "Fin",
     "feather": "Wing", "skirt": "Skirt", "cape": "Cape", "cloak": "Cape", "robe": "Skirt", "cloth": "Clothes",
-    "belt": "Clothes", "sleeve": "Clothes",
+    "belt": "Clothes", "sleeve": "Clothes", "scarf": "Clothes", "coat": "Clothes", "dress": "Skirt", "tie": "Clothes",
+    "pouch": "Held Item", "bag": "Held Item", "gun": "Held Item", "staff": "Held Item", "bow": "Held Item",
 }  # fmt: skip
 """Plain name by the words of a bone without side, numbers and fillers, in lower case and without spaces."""
 
@@ -83,7 +93,7 @@ BROADER: dict[str, str] = {
     "Toes": "Foot",
     **dict.fromkeys(
         ("Jaw", "Mouth", "Muzzle", "Nose", "Tongue", "Eye", "Brow", "Cheek", "Ear", "Hair", "Mane", "Beard", "Horn",
-         "Hat"), "Head",
+         "Hat", "Antenna"), "Head",
     ),
     **dict.fromkeys(
         ("Spine", "Back", "Chest", "Breast", "Abdomen", "Hips", "Lower Torso", "Upper Torso", "Shoulder"), "Torso"
@@ -116,6 +126,8 @@ textures or rigs on its own."""
 
 UPPER_OF = {"Arm": "Upper Arm", "Leg": "Thigh", "Foreleg": "Upper Foreleg", "Hind Leg": "Upper Hind Leg"}
 """What a bone named as a whole limb is, if the limb goes on below it."""
+NAMED_BY_JOINT = {"Shoulder": ("Forearm", "Upper Arm"), "Hips": ("Shin", "Thigh")}
+"""What a bone on one side that is named as the joint at its beginning is, if the next part hangs on it."""
 LOWER_OF = {"Arm": "Forearm", "Leg": "Shin", "Foreleg": "Lower Foreleg", "Hind Leg": "Lower Hind Leg"}
 """What a bone named as a whole limb is, if the limb begins above it."""
 ABOVE = {

@@ -14,7 +14,7 @@ PARAMETERS = (ROOT / "docs" / "parameters.md").read_text(encoding="utf-8")
 PAGES = "\n".join(
     path.read_text(encoding="utf-8") for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 )
-IN_LISTS = {"segments", "active_segment", "models", "active_model", "ranking"}
+IN_LISTS = {"segments", "active_segment", "models", "active_model", "ranking", "bones", "active_bone"}
 """Properties that the lists show, not fields."""
 IN_A_ROW = {"First", "Last", "Automatic", "Template"}
 """Settings that the docs describe with the one that they belong to, by another word or on another page."""

@@ -141,7 +141,9 @@ def test_panel_shows_the_ranking(two):
     row = column.row.return_value
     assert [call.kwargs["text"] for call in row.label.call_args_list] == ["Limbed", "Box"]
     assert [call.kwargs["text"] for call in row.operator.call_args_list] == ["Use", "Use"]
-    assert row.row.return_value.label.call_args.kwargs["text"].endswith(" %")
+    first, second = [call.kwargs["text"] for call in row.row.return_value.label.call_args_list]
+    assert first.endswith(" %")
+    assert second == "does not fit"
 
 
 # Command line

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ...core.learning.taught_parts import LEAST_FACES
 from ...core.mesh.triangle_mesh import IntArray
 from ...core.message import Message
 from ...core.user_labels import LONGEST_NAME
@@ -27,9 +28,7 @@ UNPAINTED_FACE_SET = 1
 """The face set that Blender gives to faces that nobody painted."""
 
 
-LEAST_FACES = 3
-"""Fewest triangles of a part, on all poses together; the core refuses fewer."""
-NO_PART = (
+NO_TAUGHT_PART = (
     "There is no part: paint a face set beside the one that all faces have, fill a vertex group or assign a material, "
     "or take the parts from something else"
 )
@@ -113,7 +112,7 @@ def taught_parts(
             of_objects.append(number[index])
         labels[character] = np.concatenate(of_objects)
     if not numbers:
-        raise refused[0] if refused else UserError(NO_PART)
+        raise refused[0] if refused else UserError(NO_TAUGHT_PART)
     if missing:
         told.append(Message("{names} has no parts and is left to the model", names=quoted(missing)))
     return TaughtParts(list(numbers), labels)

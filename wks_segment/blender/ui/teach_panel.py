@@ -9,7 +9,7 @@ import bpy
 from ..props.bone_item import WKSBoneItem
 from .main_panel import SubPanel
 
-INDENT = 0.6
+INDENT = 1.6
 """Width by which a row of the tree is indented for each row above it, in units of the interface."""
 
 
@@ -26,9 +26,10 @@ class WKS_SEGMENT_UL_bones(bpy.types.UIList):
             row.prop(item, "open", text="", icon="DOWNARROW_HLT" if item.open else "RIGHTARROW", emboss=False)
         else:
             row.label(text="", icon="BLANK1")
-        part = row.row(align=True)
-        part.enabled = item.parent >= 0  # the first row is always a part
-        part.prop(item, "own", text="")
+        if item.parent < 0:  # always a part
+            row.label(text="", icon="CHECKBOX_HLT")
+        else:
+            row.prop(item, "own", text="")
         name = row.row(align=True)
         name.active = item.own
         name.label(text=f"{item.name}.L/R" if item.pair else item.name, translate=False)

@@ -150,6 +150,8 @@ def _fit_to(lesson: Lesson, model: PoseSegmentation, described: Sequence[Workpie
         except UnlikePartsError as error:
             lesson, told = lesson.joined(*error.parts)
             run.report.warn(told)
+        except ValueError as error:
+            raise lesson.named(error) from error
         else:
             model.part_notes_ = PartNotes(names=dict(enumerate(lesson.names)))
             return

@@ -53,7 +53,9 @@ class StarterJob(SegmentationJob):
         return cls(**{**vars(job), "starters": starters})
 
     def compute(self, progress: Progress) -> None:
-        """Find the model that fits, and label with it; UserError if none fits.
+        """Find the model that fits best, and label with it; the report warns if it is unlike all that was learned.
+
+        That is no reason to refuse: a cartoon figure can be as unlike a real body as a chair is, and still be a person.
 
         Touches nothing of Blender, so that a thread can run it.
         """
@@ -62,14 +64,16 @@ class StarterJob(SegmentationJob):
             self.cache = self.cache or MemoryCache()
             run = Run(self.report, progress.part(0.0, RANKED_SHARE), self.cache)
             ranking = rank_poses(self.starters, self.poses, run)
-            if not ranking.best.fits:
-                raise UserError(
-                    "{names} is like none of the starter models ({models}): learn a model from poses or from your own "
-                    "parts, or add a starter model by the folder button and apply it all the same",
-                    names=quoted(dict.fromkeys(pose.character.name for pose in self.poses)),
-                    models=", ".join(named.name for named in self.starters),
-                )
             self.chosen = self.starters[ranking.best.index]
+            if not ranking.best.fits:
+                self.report.warn(
+                    Message(
+                        "{names} is unlike all that the starter models ({models}) learned: check the parts, or learn a "
+                        "model from poses or from your own parts",
+                        names=quoted(dict.fromkeys(pose.character.name for pose in self.poses)),
+                        models=", ".join(named.name for named in self.starters),
+                    )
+                )
             self.model = copy(self.chosen.model)
             self.model.smoothness = self.values["smoothness"]
             self.take_number()

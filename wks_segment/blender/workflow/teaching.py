@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ...core.learning.taught_parts import Unlabeled
+from ...core.learning.taught_parts import LEAST_FACES, NOT_SAID, Unlabeled
 from ...core.mesh.triangle_mesh import IntArray
-from ...core.message import Message
+from ...core.message import Message, message_of
 from ...rigs import parts_of_faces, split_side
 from ..errors import UserError
-from ..outputs.taught_parts import BONES, LEAST_FACES, TaughtParts, taught_parts
+from ..outputs.taught_parts import BONES, TaughtParts, taught_parts
 from ..props.settings import WKSSegmentSettings
 from ..scene import poses as reader
 from ..scene.bone_weights import bone_tree_of
@@ -23,9 +23,6 @@ from ..scene.poses import Pose
 from ..scene.simulations import check_simulations
 from . import bone_list
 from .report import Report
-
-NOT_SAID = -1
-"""Label of faces whose part is not said; as an index it is the last one."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +45,14 @@ class Lesson:
     labels: list[IntArray]
     unlabeled: Unlabeled
     from_bones: bool = False
+
+    def named(self, error: ValueError) -> ValueError:
+        """An error of the core with the name of the part that it is about, instead of its number."""
+        message = message_of(error)
+        if not isinstance(message, Message) or not isinstance(message.values.get("part"), int):
+            return error
+        name = self.names[int(str(message.values["part"]))]
+        return ValueError(Message(message.template, **{**message.values, "part": f'"{name}"'}))
 
     def joined(self, first: int, second: int) -> tuple[Lesson, Message]:
         """The lesson with two parts of the same shape as one, and what to tell about it.
@@ -82,6 +87,7 @@ class Lesson:
         kept, dropped = sorted((first, second))
         names = [each for part, each in enumerate(self.names) if part != dropped]
         names[kept] = name
+        # As an index, the number of what is not said is the last one.
         number = np.array([*range(dropped), kept, *range(dropped, len(names)), NOT_SAID])
         return replace(self, names=names, labels=[number[labels] for labels in self.labels]), told
 
@@ -108,7 +114,7 @@ def read_lesson(settings: WKSSegmentSettings, poses: Sequence[Pose], told: Repor
     if unseen:
         told.warn(
             Message(
-                "Not learned, since the poses show fewer than {least} faces of it: {names}",
+                "Not learned, since the poses show fewer than {least:,} faces of it: {names}",
                 least=LEAST_FACES,
                 names=quoted(unseen),
             )

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 
+from ..learning.parameters import Preset
 from ..learning.part_mixture import PartMixture
-from ..learning.taught_parts import TaughtLabels, TaughtParts, UnlikePartsError
+from ..learning.taught_parts import TaughtLabels, TaughtParts, Unlabeled, UnlikePartsError, checked_labels
 from ..mesh.triangle_mesh import IntArray, TriangleMesh
-from ..poses.pose_cache import Workpiece
+from ..message import Message
+from ..poses.arguments import as_list
+from ..poses.pose_cache import AnyPose, Workpiece
 from ..progress import Progress
 from .labeler import Labeler
 from .region_atlas import RegionAtlas
@@ -20,6 +24,55 @@ from .traits import Traits
 LEAST_ON_SIDE, LEAST_APART = 0.75, 0.65
 """Least share of the area of two alike parts that has its own label, not that of the other part, on the mesh that they
 were taught on: of left and right parts, and of parts that are learned apart. Chance finds a half."""
+GROUPED_SHARE = 0.7
+"""Share of the time of learning taught parts after which their mixture is known."""
+
+
+def lesson_of(
+    labels: Sequence[IntArray | None], meshes: Sequence[AnyPose], unlabeled: Unlabeled, preset: Preset
+) -> TaughtLabels:
+    """What `fit` is taught by its arguments; ValueError if labels do not fit, or cannot be learned."""
+    if preset == "paper":
+        raise ValueError('parts are taught with preset="default": with the paper\'s setting each component is a part')
+    if unlabeled not in get_args(Unlabeled):
+        raise ValueError(Message('unlabeled must be "learn" or "ignore", not {value!r}', value=unlabeled))
+    originals = [mesh if isinstance(mesh, TriangleMesh) else mesh.surface.original for mesh in meshes]
+    of_faces = checked_labels(as_list(labels, "labels"), [mesh.n_faces for mesh in originals])
+    return TaughtLabels(of_faces, unlabeled)
+
+
+def learned_lesson(
+    lesson: TaughtLabels,
+    learn: Callable[[TaughtLabels, Progress], PartMixture],
+    labeler_of: Callable[[PartMixture], Labeler],
+    poses: Sequence[Workpiece],
+    rest: TriangleMesh | None,
+    progress: Progress,
+) -> tuple[PartMixture, tuple[RegionAtlas, RegionAtlas]]:
+    """Parts that were taught, and their regions; two alike ones that are no left and right are learned apart.
+
+    Parameters
+    ----------
+    lesson : TaughtLabels
+    learn, labeler_of
+        Fit a mixture to a lesson, and make the labeler of a mixture, without an atlas.
+    poses, rest, progress
+        As for `recognized_taught_parts`.
+
+    Raises
+    ------
+    UnlikePartsError
+        If a part is not found again all the same.
+    """
+    while True:
+        learned = learn(lesson, progress.part(0.0, GROUPED_SHARE))
+        step = progress.part(GROUPED_SHARE, 1.0)
+        try:
+            return recognized_taught_parts(labeler_of(learned), learned, poses, lesson, rest, step)
+        except UnlikePartsError as error:
+            if learned.taught is None or not learned.taught.has_pair(*error.parts):
+                raise
+            lesson = replace(lesson, apart=lesson.apart | {error.parts})
 
 
 def recognized_taught_parts(

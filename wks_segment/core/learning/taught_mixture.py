@@ -36,10 +36,10 @@ def learn_taught_parts(
     parameters: Mapping[str, Any],
     poses: Sequence[Workpiece],
     lesson: TaughtLabels,
+    progress: Progress,
     training: TrainingSamples,
     rest: TriangleMesh | None,
     cache: Cache | None,
-    progress: Progress,
 ) -> PartMixture:
     """Fit a mixture to the parts that labels say; with "learn", to parts of what is not said as well.
 

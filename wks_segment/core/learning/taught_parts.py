@@ -193,7 +193,7 @@ def checked_labels(labels: Sequence[IntArray | None], n_faces: Sequence[int]) ->
         if given.shape != (count,):
             raise ValueError(
                 Message(
-                    "mesh {number} has {faces} faces, but labels of shape {given}",
+                    "mesh {number} has {faces:,} faces, but labels of shape {given}",
                     number=i + 1, faces=count, given=given.shape,
                 )
             )  # fmt: skip
@@ -230,7 +230,7 @@ def _check_counts(labels: Sequence[IntArray]) -> None:
     if len(small):
         raise ValueError(
             Message(
-                "part {part} has {count} faces in all labels together, but needs at least {least}: mark more of it",
+                "part {part} has {count:,} faces in all labels together, but needs at least {least}: mark more of it",
                 part=int(small[0]), count=int(counts[small[0]]), least=LEAST_FACES,
             )
         )  # fmt: skip
