@@ -6,13 +6,14 @@ the mixture, whose faces are told apart by their side; every other taught part i
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..files.checked_json import DamagedError
 from ..mesh.triangle_mesh import FloatArray, IntArray
 from ..message import Message
 from .merge_tree import TWO_PARTS, MergeTree
@@ -128,6 +129,21 @@ class TaughtParts:
         sides = np.zeros(self.n_parts, dtype=np.int64)
         sides[self.left[self.sided]], sides[self.right[self.sided]] = 1, -1
         return sides
+
+    def arrays(self) -> dict[str, IntArray]:
+        """Arrays for a model file; `of_arrays` reads them."""
+        return {f"taught_{name}": np.array(value, dtype=np.int64) for name, value in vars(self).items()}
+
+    @classmethod
+    def of_arrays(cls, arrays: Mapping[str, FloatArray]) -> TaughtParts | None:
+        """The taught parts in arrays of a model file, if any; DamagedError if a part is not there once."""
+        if "taught_left" not in arrays:
+            return None
+        left, right = (arrays[f"taught_{name}"].astype(np.int64) for name in ("left", "right"))
+        parts = np.append(left, right[left != right])
+        if len(left) > int(arrays["n_kinds"]) or not np.array_equal(np.sort(parts), np.arange(len(parts))):
+            raise DamagedError("taught_left and taught_right do not have each part once")
+        return cls(left, right, bool(arrays["taught_of_bodies"]))
 
     def number_of(self, n_segments: NSegments, tree: MergeTree) -> int:
         """Number of groups for a parameter `n_segments`: the taught ones, and at least one of what was not taught.
