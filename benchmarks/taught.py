@@ -1,4 +1,4 @@
-"""Parts that are taught, found on other poses and bodies: `python -m benchmarks.taught DATA [STUDY …] [--output FOLDER]`.
+"""Parts that are taught, found on other poses and bodies: `python -m benchmarks.taught DATA [STUDY …] [--output …]`.
 
 STUDY is one or more of
 
@@ -8,8 +8,8 @@ strokes     the same, with 2 % of the faces of each part said, in one place, on 
 human       the starter model of people: names on the Princeton humans and on characters with a human rig
 quadruped   the starter model of animals, taught without the animal itself
 
-DATA is the folder of `benchmarks.quality`, with `rigged` as well. Prints Markdown tables and writes pictures. "Right" is
-the share of the area that has the taught part or the name of its bone.
+DATA is the folder of `benchmarks.quality`, with `rigged` as well. Prints Markdown tables and writes pictures. "Right"
+is the share of the area that has the taught part or the name of its bone.
 """
 
 from __future__ import annotations

@@ -3,9 +3,9 @@
     human      named parts of people: MakeHuman's base mesh in several bodies and poses, by the bones of its rig
     quadruped  named parts of four-legged animals, by the bones of their rigs
 
-DATA is a folder with `makehuman` (its `3dobjs`, `rigs` and motions) and `characters` (files of rigged animals), of which
-only files are read that are in the public domain (CC0). Writes `wks_segment/models/human.json` and `quadruped.json`, the
-same bytes from the same files. Needs bpy for the animals.
+DATA is a folder with `makehuman` (its `3dobjs`, `rigs` and motions) and `characters` (files of rigged animals), of
+which only files are read that are in the public domain (CC0). Writes `wks_segment/models/human.json` and
+`quadruped.json`, the same bytes from the same files. Needs bpy for the animals.
 """
 
 from __future__ import annotations

@@ -117,8 +117,7 @@ def encode(model: ModelContent) -> str:
         arrays |= {f"kind_{name}": array for name, array in vars(traits).items()}
     taught = model.learned.taught
     if taught is not None:
-        arrays |= {f"taught_{name}": np.array(value) for name, value in vars(taught).items()}
-        arrays["taught_of_bodies"] = arrays["taught_of_bodies"].astype(np.int64)
+        arrays |= taught.arrays()
     for kind, atlas in zip(REGION_KINDS, model.atlases or (), strict=False):
         arrays |= atlas.arrays(kind)
     content = {
@@ -175,7 +174,7 @@ def _decoded(content: dict[str, Any]) -> ModelContent:
     grouping, traits, taught, atlases = None, None, None, None
     if grouped:
         grouping = _grouping(arrays)
-        taught = _taught(arrays)
+        taught = TaughtParts.of_arrays(arrays)
         if "kind_mean" in arrays:
             traits = KindTraits(*(arrays[f"kind_{name}"] for name in KindTraits.__dataclass_fields__))
         wholes, segments = (RegionAtlas.of_arrays(arrays, kind) for kind in REGION_KINDS)
@@ -207,17 +206,6 @@ def _grouping(arrays: dict[str, FloatArray]) -> MergeTree:
     curve = tree.curve()[1:MOST_SEGMENTS]
     natural = 2 + int(np.flatnonzero(curve >= curve.max() - BEST_WITHIN)[-1]) if len(curve) else 1
     return replace(tree, natural=natural)
-
-
-def _taught(arrays: dict[str, FloatArray]) -> TaughtParts | None:
-    """The taught parts in the arrays of a model file, each of which must be one group, or one side of one."""
-    if "taught_left" not in arrays:
-        return None
-    left, right = (arrays[f"taught_{name}"].astype(np.int64) for name in ("left", "right"))
-    parts = np.append(left, right[left != right])
-    if len(left) > int(arrays["n_kinds"]) or not np.array_equal(np.sort(parts), np.arange(len(parts))):
-        raise DamagedError("taught_left and taught_right do not have each part once")
-    return TaughtParts(left, right, bool(arrays["taught_of_bodies"]))
 
 
 def _fields(
@@ -261,11 +249,8 @@ def _fields(
             )
     if content["version"] == TAUGHT_VERSION:
         g = length(content, "taught_left", MOST_TAUGHT)
-        yield from (
-            Field("taught_left", (g,), 0, MOST_TAUGHT - 1, whole=True),
-            Field("taught_right", (g,), 0, MOST_TAUGHT - 1, whole=True),
-            Field("taught_of_bodies", (), 0, 1, whole=True),
-        )
+        yield from (Field(f"taught_{side}", (g,), 0, MOST_TAUGHT - 1, whole=True) for side in ("left", "right"))
+        yield Field("taught_of_bodies", (), 0, 1, whole=True)
     for kind in REGION_KINDS:
         r = length(content, f"{kind}_segment", MOST_REGIONS)
         yield from (

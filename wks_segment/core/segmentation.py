@@ -175,20 +175,16 @@ class PoseSegmentation(PoseLabeling, Estimator):
             (see `with_segments`) is the same. The result is exactly the same as without a cache.
         labels, optional
             To teach parts: for each mesh an (m,) array of the part of each face, 0, 1, … without gaps, and -1 where
-            nothing is said; or None for a mesh of which nothing is said. A few faces of each part are enough. The
-            segments of the model then have these numbers. Two parts that are left and right of each other are told
-            apart by their side, two parts that are taught as one are one.
+            nothing is said; None if all are -1. Segments have these numbers, left and right parts their own.
         unlabeled : "learn" or "ignore"
-            What becomes of faces of which nothing is said. "learn": they are cut into segments as usual, which are
-            numbered after the taught parts, and all together are `n_segments`, if that is more than the taught ones.
-            "ignore": they have no say, and every face of a mesh is given to a taught part.
+            What becomes of faces of which nothing is said. "learn": they are cut as usual into as many segments as
+            `n_segments` has beyond the taught parts, at least one, numbered after these. "ignore": they have no say.
 
         Raises
         ------
         ValueError
             If there is no pose, a parameter is out of range, there are fewer vertices than segments, or `rest` has
-            other faces than the first pose; if labels do not fit their mesh, have gaps, or a part of fewer than three
-            faces; with the paper's setting and labels.
+            other faces than the first pose; if labels do not fit, or with the paper's setting.
         UnlikePartsError
             If two taught parts cannot be told apart (a ValueError).
         SpectrumError, MemoryError
@@ -203,14 +199,14 @@ class PoseSegmentation(PoseLabeling, Estimator):
         poses, described = self._all_described(meshes, overall, cache)
         overall = overall.part(described, 1.0)
         overall(0.0, "parts")
-        training, step = TrainingSamples.of(poses, parameters), overall.part(0.0, GROUPED)
+        training = TrainingSamples.of(poses, parameters)
         atlases = None
         if lesson is not None:
             learn = partial(learn_taught_parts, parameters, poses, training=training, rest=rest, cache=cache)
             labeler_of = partial(self._labeler_of, standardizer=training.standardizer)
             learned, atlases = learned_lesson(lesson, learn, labeler_of, poses, rest, overall.part(0.0, RECOGNIZED))
         else:
-            learned = learn_parts(parameters, poses, training, rest, cache, step)
+            learned = learn_parts(parameters, poses, training, rest, cache, overall.part(0.0, GROUPED))
         if lesson is None and learned.grouping is not None:
             learned, atlases = self._recognized(
                 learned, training.standardizer, poses, rest, overall.part(GROUPED, RECOGNIZED)

@@ -67,8 +67,7 @@ class Labeler:
     traits : KindTraits or None
         Of the kinds of parts, if the model is of several meshes: a mesh is then cut by its own shape.
     taught : TaughtParts or None
-        Which of the first segments are parts that a user taught; two of them can be one segment here, told apart by
-        their side.
+        Which of the first segments are taught parts, or two of them, which differ by their side.
     sides_atlas : RegionAtlas or None
         Tells these sides.
     """
@@ -96,7 +95,6 @@ class Labeler:
             return 0.0
         if self.taught is None or self.grouping is None or self.grouping.areas is None:
             return MIN_SHARE
-        # A taught finger is small, and may be so.
         of_groups = np.bincount(self.grouping.groups(self.n_segments), self.grouping.areas)
         return float(min(MIN_SHARE, SMALLEST_OF_TAUGHT * of_groups[: self.taught.n_groups].min()))
 
@@ -108,11 +106,10 @@ class Labeler:
         """(n', parts) posteriors at the vertices of a pose, with the taught left and right parts as two."""
         if self.taught is None:
             return posteriors
-        side = np.ones(len(posteriors))
         if len(self.taught.sided) and self.sides_atlas is not None:
             (_, field), *_ = self._fields_of_sides(self.sides_atlas, [pose], Progress())
-            side = pose.surface.from_faces(field[:, None])[:, 0]
-        return self.taught.of_parts(posteriors, side)
+            return self.taught.of_parts(posteriors, pose.surface.from_faces(field[:, None])[:, 0])
+        return self.taught.of_parts(posteriors, np.ones(len(posteriors)))
 
     def smoothed(self, pose: Workpiece, n_groups: int) -> FloatArray:
         """(n', n_groups) smoothed posteriors of groups at the vertices of a pose."""
@@ -236,7 +233,7 @@ class Labeler:
     def regions_of(
         self, n_groups: int, poses: Sequence[Workpiece], progress: Progress, most: int | None = None
     ) -> tuple[list[Regions], list[Traits]]:
-        """Connected regions of groups on each pose, which are the same object for poses of one mesh, and their traits.
+        """Connected regions of groups on each pose, and their traits; poses of one mesh share the object.
 
         With `most`, of at most so many poses of one mesh.
         """
@@ -290,10 +287,9 @@ class Labeler:
         return self._with_learned_areas(mesh, self._merged(of_kinds, n_groups))
 
     def _with_learned_areas(self, mesh: PolygonMesh, posteriors: FloatArray) -> FloatArray:
-        """(p, n_groups) posteriors of polygons with the areas that were learned, if they count.
+        """(p, n_groups) posteriors of polygons with the areas that were learned, where they count.
 
-        They do for parts of one mesh that nobody named, whose areas in other poses the mixture keeps, and for parts
-        taught on several bodies; not for parts taught on one, where signatures alone are better on other bodies.
+        So they do for parts of one mesh that nobody named, and for parts taught on several bodies, not on one.
         """
         grouping = self.grouping
         do_not_count = self.traits is not None if self.taught is None else not self.taught.of_bodies

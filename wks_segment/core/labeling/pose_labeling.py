@@ -25,9 +25,9 @@ from .labeler import Labeler
 from .region_atlas import RegionAtlas
 
 TAUGHT_LENGTH = 0.015
-"""Width of the smoothing along borders of parts that were taught on one mesh, at smoothness 1, in units of the square root
-of the area: signatures are surer of them than of others, and a neck is a narrow band that more smoothing takes away
-(docs/dev/experiments.md)."""
+"""Width of the smoothing along borders of parts that were taught on one mesh, at smoothness 1, in units of the square
+root of the area: signatures are surer of them than of others, and a neck is a narrow band that more smoothing takes
+away (docs/dev/experiments.md)."""
 
 
 class PoseLabeling(PoseDescriber):

@@ -21,11 +21,9 @@ from .region_atlas import RegionAtlas
 from .taught_sides import UNKNOWN_SIDE, oriented, sides_by_labels
 from .traits import Traits
 
-LEAST_ON_SIDE, LEAST_FOUND = 0.75, 0.25
-"""Least share of the area of a part that has its label, and not that of another one that is alike, on the mesh that it
-was taught on: of left and right parts, of which chance finds a half, and of parts that are learned apart."""
-
-
+LEAST_ON_SIDE, LEAST_APART = 0.75, 0.65
+"""Least share of the area of two alike parts that has its own label, not that of the other part, on the mesh that they
+were taught on: of left and right parts, and of parts that are learned apart. Chance finds a half."""
 GROUPED_SHARE = 0.7
 """Share of the time of learning taught parts after which their mixture is known."""
 
@@ -177,9 +175,11 @@ def _check_found(
     found = labeler.segments([pose], None, labeler.min_share, progress)[0]
     areas = pose.surface.original.face_areas
     pairs = zip(taught.left[taught.sided].tolist(), taught.right[taught.sided].tolist(), strict=True)
-    least_of_pairs = dict.fromkeys(pairs, LEAST_ON_SIDE) | dict.fromkeys(lesson.apart, LEAST_FOUND)
+    least_of_pairs = dict.fromkeys(pairs, LEAST_ON_SIDE) | dict.fromkeys(lesson.apart, LEAST_APART)
     for pair, least in least_of_pairs.items():
+        shares = []
         for part, other in (pair, pair[::-1]):
             right, wrong = (float(areas[(labels == part) & (found == one)].sum()) for one in (part, other))
-            if right < least * (right + wrong):
-                raise UnlikePartsError(*sorted(pair))
+            shares.append(right / (right + wrong) if right + wrong > 0 else 1.0)
+        if np.mean(shares) < least:
+            raise UnlikePartsError(*sorted(pair))

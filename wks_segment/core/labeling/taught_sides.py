@@ -1,4 +1,4 @@
-"""Left and right of taught parts: which part of a pair is on the left, and which half of a group each face belongs to."""
+"""Left and right of taught parts: which part of a pair is on the left, and in which half of a group each face lies."""
 
 from __future__ import annotations
 

@@ -82,9 +82,8 @@ def learn_taught_parts(
         group[~said] = n_groups + _of_samples(poses, of_faces, kinds.count, training)[~said]
         n_groups += kinds.count
     progress.part(0.5, 1.0, "mixture")(0.0)
-    covariance_type: CovarianceType = effective(parameters, "covariance_type")
-    if covariance_type == "auto":
-        covariance_type = "tied" if alone else "diag"
+    asked = effective(parameters, "covariance_type")
+    covariance_type: CovarianceType = ("tied" if alone else "diag") if asked == "auto" else asked
     per_part = COMPONENTS_OF_MESH if alone else COMPONENTS_OF_BODIES
     chosen = training.only(group >= 0)
     mixture, group_of = fitted_inside(

@@ -6,13 +6,14 @@ the mixture, whose faces are told apart by their side; every other taught part i
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..files.checked_json import DamagedError
 from ..mesh.triangle_mesh import FloatArray, IntArray
 from ..message import Message
 from .merge_tree import TWO_PARTS, MergeTree
@@ -30,8 +31,11 @@ ALIKE = 0.7
 """Two parts are alike if the samples of each are so near to those of the other, in units of the spread inside the part
 (median). On five scans of people and on MakeHuman's body, mirrored parts have 0.02 to 0.63 (once 0.88), neighbors and
 any others 0.89 and more."""
+MUCH_NEARER = 0.6
+"""Two parts are alike only if they are nearer to each other than to any third part by this factor: limbs of a figure
+can all be somewhat alike. It is up to 0.55 for mirrored parts of four of five scans."""
 LEAST_COMMON = 0.5
-"""Share of the borders of two mirrored parts that is with the same parts: 1 but for borders at rest on one side only."""
+"""Share of the borders of two mirrored parts that is with the same parts, from which they are mirrored; at best 1."""
 
 Unlabeled = Literal["learn", "ignore"]
 
@@ -94,7 +98,8 @@ class TaughtParts:
         """Groups in the order of their lowest parts, given pairs of left and right parts, the lower number first."""
         of_pairs = {part for pair in pairs for part in pair}
         both = sorted([*pairs, *((part, part) for part in range(n_parts) if part not in of_pairs)])
-        return cls(*(np.array([pair[side] for pair in both], dtype=np.int64) for side in (0, 1)), of_bodies)
+        left, right = np.array(both, dtype=np.int64).T
+        return cls(left, right, of_bodies)
 
     @property
     def n_groups(self) -> int:
@@ -124,6 +129,21 @@ class TaughtParts:
         sides = np.zeros(self.n_parts, dtype=np.int64)
         sides[self.left[self.sided]], sides[self.right[self.sided]] = 1, -1
         return sides
+
+    def arrays(self) -> dict[str, IntArray]:
+        """Arrays for a model file; `of_arrays` reads them."""
+        return {f"taught_{name}": np.array(value, dtype=np.int64) for name, value in vars(self).items()}
+
+    @classmethod
+    def of_arrays(cls, arrays: Mapping[str, FloatArray]) -> TaughtParts | None:
+        """The taught parts in arrays of a model file, if any; DamagedError if a part is not there once."""
+        if "taught_left" not in arrays:
+            return None
+        left, right = (arrays[f"taught_{name}"].astype(np.int64) for name in ("left", "right"))
+        parts = np.append(left, right[left != right])
+        if len(left) > int(arrays["n_kinds"]) or not np.array_equal(np.sort(parts), np.arange(len(parts))):
+            raise DamagedError("taught_left and taught_right do not have each part once")
+        return cls(left, right, bool(arrays["taught_of_bodies"]))
 
     def number_of(self, n_segments: NSegments, tree: MergeTree) -> int:
         """Number of groups for a parameter `n_segments`: the taught ones, and at least one of what was not taught.
@@ -235,7 +255,7 @@ def _check_counts(labels: Sequence[IntArray]) -> None:
 def alike_parts(
     places: FloatArray, part: IntArray, n_parts: int, apart: Collection[tuple[int, int]] = ()
 ) -> list[tuple[int, int]]:
-    """Pairs of parts that have the same signatures: each part is in one pair at most, with the one it is most like.
+    """Pairs of parts that have the same signatures: each part is in one pair at most.
 
     Parameters
     ----------
@@ -266,13 +286,12 @@ def alike_parts(
     for i, j in apart:
         unlike[i, j] = unlike[j, i] = np.inf
     pairs = []
-    while n_parts > 1:
-        i, j = divmod(int(unlike.argmin()), n_parts)
-        if not unlike[i, j] < ALIKE:
-            break
-        pairs.append((min(i, j), max(i, j)))
-        unlike[[i, j]] = unlike[:, [i, j]] = np.inf
-    return sorted(pairs)
+    for i in range(n_parts):
+        for j in range(i + 1, n_parts):
+            others = np.delete(unlike[[i, j]], [i, j], axis=1)
+            if unlike[i, j] < min(ALIKE, MUCH_NEARER * others.min(initial=np.inf)):
+                pairs.append((i, j))
+    return pairs
 
 
 def with_like_neighbors(pairs: Sequence[tuple[int, int]], touching: FloatArray) -> list[tuple[int, int]]:
