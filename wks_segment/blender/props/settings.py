@@ -15,7 +15,7 @@ from bpy.props import (
     StringProperty,
 )  # fmt: skip
 
-from ...core import PoseSegmentation
+from ... import core
 from ..errors import UserError
 from ..parts.palette import DEFAULT_PALETTE, MAX_COLORS, RECIPES
 from ..parts.part_style import SetNotes, Style
@@ -363,7 +363,7 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         """The number of segments in the form that a model takes."""
         return "auto" if self.auto_segments else self.n_segments
 
-    def new_model(self) -> PoseSegmentation:
+    def new_model(self) -> core.PoseSegmentation:
         """An unfitted model with these settings; UserError if they exclude each other."""
         parameters: dict[str, Any] = {name: getattr(self, name) for name in MODEL_PARAMETERS}
         if self.auto_segments:
@@ -373,7 +373,7 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
                     "robust method"
                 )
             parameters["n_segments"] = "auto"
-        return PoseSegmentation(**parameters)
+        return core.PoseSegmentation(**parameters)
 
     def labels(self) -> str:
         """Key of the label set of the model in use; empty if there is none."""

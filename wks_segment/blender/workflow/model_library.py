@@ -16,7 +16,8 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from ...core import ModelFileError, PartNotes, PoseSegmentation, model_file
+from ... import core
+from ...core import PartNotes
 from ...core.message import Message, message_of
 from ..errors import UserError
 from ..parts.part_style import SetNotes
@@ -83,7 +84,7 @@ def text_of(settings: WKSSegmentSettings, uid: str) -> str:
 
 
 def learned(
-    settings: WKSSegmentSettings, model: PoseSegmentation, summary: Sequence[str], names: Sequence[str],
+    settings: WKSSegmentSettings, model: core.PoseSegmentation, summary: Sequence[str], names: Sequence[str],
     character: str,
 ) -> str:  # fmt: skip
     """Keep a learned model and use it; return the key of its label set.
@@ -121,7 +122,7 @@ def learned(
     return str(row.labels())
 
 
-def adjusted(settings: WKSSegmentSettings, uid: str, model: PoseSegmentation) -> str:
+def adjusted(settings: WKSSegmentSettings, uid: str, model: core.PoseSegmentation) -> str:
     """Keep a model of the scene, if it is there, as it was applied last; return the key of its labels.
 
     That is with another number of segments or smoothness: applied again, it gives the same labels.
@@ -162,7 +163,7 @@ def store_active(settings: WKSSegmentSettings) -> None:
             setattr(row, name, getattr(settings, place))
 
 
-def add_model(settings: WKSSegmentSettings, model: PoseSegmentation, name: str, summary: Sequence[str]) -> str:
+def add_model(settings: WKSSegmentSettings, model: core.PoseSegmentation, name: str, summary: Sequence[str]) -> str:
     """Add a model with its own names and colors to the list, and use it; return the key of its label set."""
     list_active(settings)
     notes, model.part_notes_ = model.part_notes_, PartNotes()
@@ -214,33 +215,33 @@ def remove(settings: WKSSegmentSettings) -> None:
         _take(settings, min(index, len(settings.models) - 1))
 
 
-def loaded(path: Path) -> PoseSegmentation:
+def loaded(path: Path) -> core.PoseSegmentation:
     """The model in a file; UserError, which names the file, if it cannot be read or used."""
     try:
-        return PoseSegmentation.load(path)
+        return core.PoseSegmentation.load(path)
     except FileNotFoundError:
         raise UserError("{path}: there is no such file", path=path) from None
-    except (ModelFileError, OSError) as error:
+    except (core.ModelFileError, OSError) as error:
         reason = getattr(error, "strerror", None) or message_of(error)
         raise UserError("{path}: {reason}", path=path, reason=reason) from error
 
 
-def from_text(text: str) -> PoseSegmentation:
+def from_text(text: str) -> core.PoseSegmentation:
     """The model in JSON text; UserError if it cannot be used."""
     try:
-        return PoseSegmentation.from_json(text)
+        return core.PoseSegmentation.from_json(text)
     except ValueError as error:
         raise UserError("The model in this file cannot be used: {reason}", reason=message_of(error)) from error
 
 
-def save(model: PoseSegmentation, path: Path, summary: Sequence[str]) -> None:
+def save(model: core.PoseSegmentation, path: Path, summary: Sequence[str]) -> None:
     """Write a model to a file, with the lines on what it was learned from; errors as of `PoseSegmentation.save`."""
-    model_file.write(path, json.dumps(json.loads(model.to_json()) | {LEARNED_FROM: as_json(summary)}))
+    core.model_file.write(path, json.dumps(json.loads(model.to_json()) | {LEARNED_FROM: as_json(summary)}))
 
 
 def summary_in(path: Path) -> list[str]:
     """Lines on what the model in a file was learned from; none if the file has none."""
-    return from_json(json.loads(model_file.read(path)).get(LEARNED_FROM))
+    return from_json(json.loads(core.model_file.read(path)).get(LEARNED_FROM))
 
 
 def in_folder(folder: str | Path) -> dict[str, Path]:

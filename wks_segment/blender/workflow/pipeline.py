@@ -11,14 +11,11 @@ from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
-from scipy.spatial import cKDTree
 
-from ...core import PoseSegmentation, Workpiece
+from ... import core
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ...core.message import Message, message_of
-from ...core.poses.describe import LEARNING
 from ...core.progress import Progress
-from ...core.spectral.memory import available_memory
 from ..errors import TooLargeError, UserError
 from ..outputs.labels import rewrite_labels, write_labels
 from ..outputs.marked_edges import marked_pairs
@@ -74,8 +71,10 @@ class LabelRequest:
         )
 
 
-def check_limits(model: PoseSegmentation, poses: Sequence[Pose], settings: WKSSegmentSettings) -> None:
+def check_limits(model: core.PoseSegmentation, poses: Sequence[Pose], settings: WKSSegmentSettings) -> None:
     """Raise TooLargeError, with the estimate, if the signatures of poses need more time or memory than is allowed."""
+    from ...core.spectral.memory import available_memory
+
     seconds, needed = model.estimate([pose.mesh for pose in poses])
     allowed = 1e9 * settings.limit_memory or available_memory()
     if seconds <= 60 * settings.limit_minutes and needed <= allowed:
@@ -93,7 +92,7 @@ def check_limits(model: PoseSegmentation, poses: Sequence[Pose], settings: WKSSe
     )
 
 
-def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[Workpiece]:
+def learn(model: core.PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[core.Workpiece]:
     """Fit a model to poses; return the described poses.
 
     Raises
@@ -109,6 +108,8 @@ def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[Work
             faces=n_faces,
             segments=model.n_segments,
         )
+    from ...core.poses.describe import LEARNING
+
     prepared = prepare(model, poses, run)
     share = prepared.describing_share(model, poses, LEARNING)
     described = describe(model, poses, run.with_progress(run.progress.part(0.0, share)), prepared)
@@ -123,7 +124,11 @@ def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> list[Work
 
 
 def label(
-    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[Workpiece], request: LabelRequest, run: Run
+    model: core.PoseSegmentation,
+    poses: Sequence[Pose],
+    described: Sequence[core.Workpiece],
+    request: LabelRequest,
+    run: Run,
 ) -> dict[Character, IntArray]:
     """Part of each polygon of each character; one result for all poses and all objects that share a mesh."""
     labels: dict[Character, IntArray] = {}
@@ -149,7 +154,7 @@ class MeshViews:
     """One mesh in all of its poses: the poses, the same described, and the whole mesh."""
 
     poses: list[Pose]
-    described: list[Workpiece]
+    described: list[core.Workpiece]
     body: Body
 
     @property
@@ -163,7 +168,7 @@ class MeshViews:
         return [pose.polygon_of for pose in self.poses]
 
 
-def _parts_of(model: PoseSegmentation, views: MeshViews, request: LabelRequest, progress: Progress) -> IntArray:
+def _parts_of(model: core.PoseSegmentation, views: MeshViews, request: LabelRequest, progress: Progress) -> IntArray:
     """(p,) part of each polygon of a mesh."""
     two_sides = request.sides == "two"
     min_share = None if model.preset == "paper" else request.min_share
@@ -187,7 +192,7 @@ def _parts_of(model: PoseSegmentation, views: MeshViews, request: LabelRequest, 
 
 
 def soften(
-    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[Workpiece],
+    model: core.PoseSegmentation, poses: Sequence[Pose], described: Sequence[core.Workpiece],
     labels: dict[Character, IntArray], request: LabelRequest, run: Run,
 ) -> dict[Character, dict[int, FloatArray]] | None:  # fmt: skip
     """Weights of each part at each character's vertices, one result for all poses of a mesh as in `label`.
@@ -272,7 +277,7 @@ def rewrite_outputs(settings: WKSSegmentSettings, mesh: bpy.types.Mesh, warnings
     rewrite_labels(mesh, options.style, settings.notes(origin.labels).joined, warnings, options)
 
 
-def stored_model(settings: WKSSegmentSettings) -> PoseSegmentation:
+def stored_model(settings: WKSSegmentSettings) -> core.PoseSegmentation:
     """The model that was learned in or loaded into this scene; UserError if there is none."""
     if not settings.model:
         raise UserError("No model yet: learn one with Learn and Segment, or load one from a file")
@@ -285,5 +290,7 @@ def filled(labels: IntArray, body: Body) -> IntArray:
     labels = np.concatenate([labels, np.full(len(places) - len(labels), -1)])
     missing = labels < 0
     if missing.any():
-        labels[missing] = labels[~missing][cKDTree(places[~missing]).query(places[missing])[1]]
+        import scipy
+
+        labels[missing] = labels[~missing][scipy.spatial.cKDTree(places[~missing]).query(places[missing])[1]]
     return labels

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import bpy
 
-from ...core import Cache, PoseSegmentation, Workpiece
+from ... import core
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ...core.message import Message, message_of
 from ...core.progress import Progress
@@ -80,25 +80,25 @@ class SegmentationJob:
         The part of each polygon of each character, once computed.
     """
 
-    model: PoseSegmentation
+    model: core.PoseSegmentation
     poses: list[Pose]
     request: LabelRequest
     guard: ChangeGuard
     report: Report
     learns: bool
     number: int | Literal["auto"]
-    cache: Cache
+    cache: core.Cache
     values: dict[str, Any] = field(default_factory=dict)
     uid: str = ""
     name: str = ""
     compared: list[NamedModel] = field(default_factory=list)
-    described: list[Workpiece] = field(default_factory=list)
+    described: list[core.Workpiece] = field(default_factory=list)
     first: SegmentationJob | None = None
     labels: dict[Character, IntArray] = field(default_factory=dict)
     _weights: dict[Character, dict[int, FloatArray]] | None = None
 
     @classmethod
-    def learning(cls, context: bpy.types.Context, cache: Cache) -> SegmentationJob:
+    def learning(cls, context: bpy.types.Context, cache: core.Cache) -> SegmentationJob:
         """Read poses and settings to learn from; UserError if they cannot be used."""
         settings, report = context.scene.wks_segment, Report([])
         with report.stage("read"):
@@ -110,7 +110,7 @@ class SegmentationJob:
 
     @classmethod
     def applying(
-        cls, context: bpy.types.Context, cache: Cache, model: PoseSegmentation | None = None,
+        cls, context: bpy.types.Context, cache: core.Cache, model: core.PoseSegmentation | None = None,
         objects: Sequence[bpy.types.Object] = (), uid: str = "",
     ) -> SegmentationJob:  # fmt: skip
         """Read objects to apply a model to: the selected ones and the model in use if none are given.
@@ -151,7 +151,7 @@ class SegmentationJob:
 
     @classmethod
     def _read(
-        cls, context: bpy.types.Context, model: PoseSegmentation, report: Report, cache: Cache, learns: bool,
+        cls, context: bpy.types.Context, model: core.PoseSegmentation, report: Report, cache: core.Cache, learns: bool,
         uid: str = "",
     ) -> SegmentationJob:  # fmt: skip
         settings, poses = context.scene.wks_segment, report.poses
