@@ -251,6 +251,12 @@ class WKSSegmentSettings(bpy.types.PropertyGroup):
         name="Colors", description="Write a color attribute with one flat color for each face, and show it",
         default=True, update=_outputs_changed,
     )  # fmt: skip
+    write_ucupaint: BoolProperty(
+        name="Ucupaint",
+        description="Write the color attribute that the Color ID masks of the add-on Ucupaint read",
+        default=False,
+        update=_outputs_changed,
+    )
     write_materials: BoolProperty(
         name="Materials",
         description="Add a material slot for each segment. Clear restores the object's own materials",

@@ -259,6 +259,7 @@ def options_of(settings: WKSSegmentSettings) -> OutputOptions:
     """What the settings ask to be written."""
     return OutputOptions(
         colors=settings.write_colors,
+        ucupaint=settings.write_ucupaint,
         materials=settings.write_materials,
         template=settings.material_template.name if settings.material_template is not None else "",
         vertex_groups=settings.vertex_groups,
