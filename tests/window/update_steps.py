@@ -64,7 +64,7 @@ def check():
     bpy.context.view_layer.objects.active = body
     assert bpy.ops.wks_segment.load_model(filepath=f"{MODELS}/creature.json") == {"FINISHED"}
     assert bpy.ops.wks_segment.clear() == {"FINISHED"}
-    assert not [name for name in body.data.attributes.keys() if name.startswith("wks_segment")]
+    assert not [name for name in map(str, body.data.attributes.keys()) if name.startswith("wks_segment")]
 
 
 step, version = sys.argv[sys.argv.index("--") + 1 :]

@@ -17,5 +17,5 @@ __all__ = ["commands", "register", "unregister"]
 def __getattr__(name: str) -> ModuleType:
     """The command line, which is imported only when it is used."""
     if name != "commands":
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        raise AttributeError(name, name=name)
     return importlib.import_module(".cli.main", __name__)

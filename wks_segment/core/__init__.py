@@ -95,7 +95,7 @@ _MODULE_OF = {name: module for module, names in MODULES.items() for name in name
 def __getattr__(name: str) -> Any:
     """Called by Python for a name that is not imported yet."""
     if name not in _MODULE_OF:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        raise AttributeError(name, name=name)
     value = getattr(importlib.import_module(f".{_MODULE_OF[name]}", __name__), name)
     globals()[name] = value
     return value

@@ -92,6 +92,6 @@ def test_a_new_color_in_the_list_is_written_at_once(settings, obj):
     row = settings.segments[0]
     row.color = (0.1, 0.9, 0.3)
     labels = np.array([value.value for value in obj.data.attributes["wks_segment"].data])
-    np.testing.assert_array_equal(mask(obj.data, linear((0.1, 0.9, 0.3))), labels == row.part)
+    np.testing.assert_array_equal(mask(obj.data, linear((0.1, 0.9, 0.3))), labels == row.number)
     assert OPS.clear() == {"FINISHED"}
     assert COLOR_IDS not in obj.data.attributes

@@ -11,7 +11,6 @@ import numpy as np
 
 from ...core.mesh.triangle_mesh import BoolArray, FloatArray
 from ...core.message import Message
-from ..parts import part_ids
 from ..parts.part_style import Style
 from ..scene.attributes import read_face_ints, read_floats, write_attribute
 from ..scene.topology import at_corners
@@ -21,7 +20,7 @@ from .part_attributes import labels_on
 
 COLOR_IDS = "__yp_color_id"
 """Name that Ucupaint looks for; a name with a number would be no use."""
-SAME_COLOR = 1e-3
+UNCHANGED_COLOR = 1e-3
 """Difference of channels below which a color is still the one that was written."""
 
 
@@ -42,11 +41,11 @@ class UcupaintColors:
         mesh.color_attributes.active_color_name = shown
         mesh.color_attributes.render_color_index = rendered
         ledger["color_ids"] = attribute.name
-        present = np.array(part_ids.unique_parts(parts.of_polygons))
+        present, of_polygons = np.unique(parts.of_polygons, return_inverse=True)
         colors = parts.options.style.colors_of(present)
         ledger["color_id_parts"] = {str(part): color for part, color in zip(present, colors.tolist(), strict=True)}
-        of_faces = colors[np.searchsorted(present, parts.of_polygons)]
-        write_attribute(attribute, np.pad(at_corners(mesh, of_faces), [(0, 0), (0, 1)], constant_values=1.0))
+        of_corners = colors[at_corners(mesh, of_polygons.ravel())]
+        write_attribute(attribute, np.pad(_linear(of_corners), [(0, 0), (0, 1)], constant_values=1.0))
 
     def take_back(self, mesh: bpy.types.Mesh, ledger: Ledger) -> None:
         """Remove the attribute, unless the artist has filled faces with other colors since."""
@@ -67,11 +66,16 @@ def recolor_ids(mesh: bpy.types.Mesh, part: int, style: Style) -> None:
     if labels is None or attribute is None or _was_changed(mesh, ledger):
         return
     [color] = style.colors_of(np.array([part])).tolist()
-    colors = read_floats(attribute.data, "color_srgb", 4)
-    colors[at_corners(mesh, labels == part), :3] = color
+    colors = read_floats(attribute.data, "color", 4)
+    colors[at_corners(mesh, labels == part), :3] = _linear(np.array(color))
     write_attribute(attribute, colors)
     ledger["color_id_parts"] = dict(ledger["color_id_parts"]) | {str(part): color}
     mesh.update()
+
+
+def _linear(colors: FloatArray) -> FloatArray:
+    """(…, 3) linear colors, as float attributes store them, given sRGB."""
+    return np.where(colors <= 0.04045, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
 
 
 def _was_changed(mesh: bpy.types.Mesh, ledger: Ledger) -> bool:
@@ -89,4 +93,4 @@ def _was_changed(mesh: bpy.types.Mesh, ledger: Ledger) -> bool:
 
 
 def _differs(colors: FloatArray, corners: BoolArray, color: FloatArray) -> bool:
-    return bool((np.abs(colors[corners] - color) > SAME_COLOR).any())
+    return bool((np.abs(colors[corners] - color) > UNCHANGED_COLOR).any())
