@@ -75,6 +75,14 @@ class Surface:
         The faces of `original` with one number for all vertices that are welded: neighbors on the surface share edges.
     mirror : Mirror or None
         Mirror images of the faces of `original`, at rest; None if it is not symmetric.
+
+    Examples
+    --------
+    >>> from examples.tube import tube
+    >>> from wks_segment.core import prepare_surface
+    >>> surface = prepare_surface(tube(0.5))
+    >>> surface.n_islands, round(float(surface.mesh.area), 6)
+    (1, 1.0)
     """
 
     original: TriangleMesh
@@ -146,6 +154,14 @@ class Connection:
         The faces in such an order.
     mirror : Mirror or None
         Mirror images of the faces at rest, or in the most symmetric pose; None if the mesh is not symmetric.
+
+    Examples
+    --------
+    >>> from examples.tube import tube
+    >>> from wks_segment.core import connect, prepare_surface
+    >>> connection = connect(tube(0.0), tube(1.0))
+    >>> prepare_surface(tube(0.5), connection=connection).n_islands
+    1
     """
 
     welded: IntArray
@@ -179,6 +195,14 @@ def connect(*poses: TriangleMesh, rest: TriangleMesh | None = None, pieces: Isla
     ------
     ValueError
         If no face is left after welding.
+
+    Examples
+    --------
+    >>> from examples.tube import tube
+    >>> from wks_segment.core import connect
+    >>> connection = connect(tube(0.0), tube(1.0))  # two poses of one mesh
+    >>> len(connection.ties)  # it is one island
+    0
     """
     welded = weld(*poses, *([] if rest is None else [rest]))
     first = poses[0] if rest is None else rest
@@ -236,6 +260,13 @@ def prepare_surface(
     ------
     ValueError
         If no face is left after welding.
+
+    Examples
+    --------
+    >>> from examples.tube import tube
+    >>> from wks_segment.core import prepare_surface
+    >>> tube(0.5).n_vertices, prepare_surface(tube(0.5), min_vertices=900).mesh.n_vertices > 900
+    (290, True)
     """
     connection = connection or connect(mesh, pieces=pieces)
     welded_faces = connection.welded[mesh.faces]

@@ -38,6 +38,13 @@ class TriangleMesh:
     ValueError
         If an array has the wrong shape, a coordinate is not finite, an index is out of range, a face uses a vertex
         twice, there is no face, or the surface has no area. The message names the first such vertex or face.
+
+    Examples
+    --------
+    >>> from wks_segment.core import TriangleMesh
+    >>> mesh = TriangleMesh([[0, 0, 0], [2, 0, 0], [0, 2, 0]], [[0, 1, 2]])
+    >>> mesh.n_vertices, float(mesh.area)
+    (3, 2.0)
     """
 
     def __init__(
