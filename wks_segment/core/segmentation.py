@@ -250,7 +250,7 @@ class PoseSegmentation(PoseLabeling, Estimator):
         ----------
         n_segments : int or "auto"
             As for a new model, but at most the number of components.
-        poses, optional
+        poses : sequence of PoseSignature, optional
             The learned poses, as `describe_all` gives them together. `segment_regions` then finds the regions of the
             new segments; without them it finds the learned ones, which also serve `polygon_sides`.
         rest : TriangleMesh, optional
