@@ -53,6 +53,15 @@ def test_no_link_is_dead(page):
             assert anchor in anchors(target), link
 
 
+LIST_WITHOUT_SPACE = re.compile(r"^(?![-#\s]|\d+\. ).+\n(?:- |1\. ).*", re.MULTILINE)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_lists_are_lists(page):
+    """mkdocs takes a list right below a paragraph for more of the paragraph; GitHub does not."""
+    assert LIST_WITHOUT_SPACE.findall(text_of(page)) == []
+
+
 def test_the_readme_is_short():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 90
 
