@@ -83,7 +83,7 @@ def _was_changed(mesh: bpy.types.Mesh, ledger: Ledger) -> bool:
     labels, attribute = labels_on(mesh), ledger.attribute("color_ids")
     if labels is None or attribute is None or (attribute.data_type, attribute.domain) != ("FLOAT_COLOR", "CORNER"):
         return True
-    colors = read_floats(attribute.data, "color_srgb", 4)[:, :3]
+    colors = read_floats(attribute.data, "color_srgb", 4)[:, :3].astype(np.float64)
     written = read_face_ints(mesh, ledger.get("written", ""))
     ours = np.ones(len(labels), dtype=bool) if written is None else written == ledger.get(MARK, 0)
     return any(
