@@ -26,7 +26,7 @@ FIGURES = {
 IN_README = ("98.5 %", "97.1 %", "95.7 %", "94.0 %", "0.096", "0.085", "0.8 s", "15 s", "1 GB")
 PANEL = ("main_panel.py", "segments_panel.py", "models_panel.py")
 """Files that say what the panel shows."""
-PICTURES_OF_THE_PANEL = ("panel.png",)
+PICTURES_OF_THE_PANEL = ("panel.png", "panel_outputs.png")
 
 
 def text_of(path):
