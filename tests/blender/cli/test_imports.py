@@ -26,7 +26,7 @@ os._exit(0)
 """
 """Python code that enables the extension, as Blender does it at its start, and prints its seconds of a processor."""
 MOST_SECONDS = 0.2
-"""Twice the tenth of a second that enabling may take, since the tests share their processors with others."""
+"""Twice the tenth of a second that enabling takes after NumPy, since the tests share their processors with others."""
 
 
 def imported(*arguments):
