@@ -6,6 +6,7 @@ No window is opened. An update must keep the user's models, names, settings, pre
 import functools
 import re
 import shutil
+import subprocess
 import threading
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 
@@ -15,7 +16,8 @@ from driver import HERE
 
 from scripts import build_repository, build_zip
 
-OLD = "0.1.0"
+OLD, LAST_OF_OLD = "0.1.0", "cfd421d"
+"""The version that is updated, and its last commit."""
 NAME = "wks_repository"
 
 
@@ -52,13 +54,18 @@ def served(tmp_path):
 
 @pytest.fixture(scope="session")
 def old_zip(tmp_path_factory):
-    """The extension as version 0.1.0: what matters for an update is the number."""
+    """The extension as it was in version 0.1.0, or in a shallow clone today's with that number."""
     source = tmp_path_factory.mktemp("old")
-    shutil.copytree(ROOT / build_zip.PACKAGE, source / build_zip.PACKAGE, ignore=shutil.ignore_patterns("__pycache__"))
-    for name in ("__init__.py", "LICENSE", build_zip.README):
-        shutil.copy2(ROOT / name, source / name)
-    manifest = (ROOT / build_zip.MANIFEST).read_text(encoding="utf-8")
-    (source / build_zip.MANIFEST).write_text(re.sub(r'\nversion = ".*"', f'\nversion = "{OLD}"', manifest))
+    archive = subprocess.run(["git", "archive", LAST_OF_OLD], cwd=ROOT, capture_output=True, check=False)
+    if archive.returncode == 0:
+        subprocess.run(["tar", "-x", "-C", source], input=archive.stdout, check=True)
+    else:
+        ignored = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / build_zip.PACKAGE, source / build_zip.PACKAGE, ignore=ignored)
+        for name in ("__init__.py", "LICENSE", build_zip.README):
+            shutil.copy2(ROOT / name, source / name)
+        manifest = (ROOT / build_zip.MANIFEST).read_text(encoding="utf-8")
+        (source / build_zip.MANIFEST).write_text(re.sub(r'\nversion = ".*"', f'\nversion = "{OLD}"', manifest))
     output = tmp_path_factory.mktemp("old_zip")
     arguments = ["--source", source, "--output", output, "--platform", "linux-x64", "--python", "3.13", "3.14"]
     assert build_zip.main(list(map(str, arguments))) == 0
