@@ -19,7 +19,7 @@ ON_OLDEST := tests/blender tests/core/test_estimator.py tests/core/test_model_fi
 # Wheels only, and no byte code before it is needed.
 PIP := -m pip install --quiet --disable-pip-version-check --only-binary :all: --no-compile
 
-.PHONY: help install install-oldest demo test test-oldest test-window guard screenshots fuzz lint zip docs clean
+.PHONY: help install install-oldest demo test test-oldest test-window guard screenshots fuzz lint zip repository docs clean
 
 help:  ## list the commands
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
@@ -58,11 +58,14 @@ lint: $(VENV)/.ready  ## ruff, mypy, and the spelling of code and docs
 zip: $(VENV)/.ready  ## the extension for each platform, in dist/ (PLATFORM=linux-x64: for one)
 	$(RUN) scripts/build_zip.py $(if $(PLATFORM),--platform $(PLATFORM))
 
+repository: $(VENV)/.ready  ## a folder for a web server, from which Blender installs and updates, in repository/
+	$(RUN) -m scripts.build_repository
+
 docs: $(DOCS)/.ready  ## the site of docs/, in site/; fails on a dead link
 	$(DOCS)/bin/python -m mkdocs build --strict
 
 clean:  ## remove the environments and all that was built
-	rm -rf $(VENV) $(OLDEST) $(DOCS) dist wheels demo site
+	rm -rf $(VENV) $(OLDEST) $(DOCS) dist wheels demo site repository
 
 $(VENV)/.ready: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || \

@@ -4,4 +4,4 @@
 `wks_segment.batch` runs the command line for many files. Importing this package imports none of them.
 """
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -61,6 +61,8 @@ class RealBlender:
         self.root = folder.resolve() / f"blender{version.replace('.', '')}"
         self.shared = self.root / "window"
         """Folder that Blender sees as /window."""
+        self.user = "/window/user"
+        """Folder of the user's settings and extensions, as Blender sees it: that of a new user."""
         self.display = display
         self.clicks = 0
         """Number of clicks and drags since the start."""
@@ -342,7 +344,7 @@ class RealBlender:
             "LIBGL_ALWAYS_SOFTWARE": "1",
             "HOME": "/window",
             "XDG_RUNTIME_DIR": "/tmp",
-            "BLENDER_USER_RESOURCES": "/window/user",  # a new user
+            "BLENDER_USER_RESOURCES": self.user,
             "PYTHONUNBUFFERED": "1",
             "PATH": "/usr/bin:/bin",
         }

@@ -138,6 +138,18 @@ def segments(name):
     return {str(part): int(count) for part, count in zip(*found, strict=True)}
 
 
+def clipboard():
+    """The text of the clipboard."""
+    return bpy.context.window_manager.clipboard
+
+
+def color_ids(name):
+    """The (linear) colors that masks of Ucupaint find on an object."""
+    mesh = bpy.data.objects[name].data
+    attribute = mesh.color_attributes.get("__yp_color_id")
+    return [] if attribute is None else np.unique([list(value.color) for value in attribute.data], axis=0).tolist()
+
+
 def rows():
     """The list of segments: [name, share, hidden, number of selected faces] of each."""
     mesh = _window().view_layer.objects.active.data

@@ -4,7 +4,18 @@ Scripts in Blender find here `commands.run`, the command line, and in the module
 are grouped and read.
 """
 
-from .cli import main as commands
+from __future__ import annotations
+
+import importlib
+from types import ModuleType
+
 from .registration import register, unregister
 
 __all__ = ["commands", "register", "unregister"]
+
+
+def __getattr__(name: str) -> ModuleType:
+    """The command line, which is imported only when it is used."""
+    if name != "commands":
+        raise AttributeError(name, name=name)
+    return importlib.import_module(".cli.main", __name__)

@@ -6,7 +6,6 @@ from typing import Any
 
 import bpy
 
-from .cli.main import run
 from .operators.accept import WKS_SEGMENT_OT_accept
 from .operators.apply import WKS_SEGMENT_OT_apply
 from .operators.apply_ranked import WKS_SEGMENT_OT_apply_ranked
@@ -117,6 +116,13 @@ _commands: list[Any] = []
 """Handles of the registered command, which Blender needs to unregister it."""
 
 
+def _run_command(arguments: list[str]) -> int:
+    """The command line, which is imported only when it is used."""
+    from .cli.main import run
+
+    return run(arguments)
+
+
 def register() -> None:
     """Called by Blender when the extension is enabled."""
     changes.set_listener(PropertyChanges())
@@ -132,7 +138,7 @@ def register() -> None:
     setattr(bpy.types.WindowManager, COLOR_ICONS, ColorIcons())
     bpy.app.translations.register(__name__, TRANSLATIONS)
     bpy.types.VIEW3D_MT_object.append(menu.draw_in_object_menu)
-    _commands.append(bpy.utils.register_cli_command(COMMAND_NAME, run))
+    _commands.append(bpy.utils.register_cli_command(COMMAND_NAME, _run_command))
 
 
 def unregister() -> None:

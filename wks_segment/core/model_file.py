@@ -70,7 +70,17 @@ MAX_BYTES = 20 * 2**20
 
 
 class ModelFileError(ValueError):
-    """The file or text is not a model that this version can read; the message says why."""
+    """The file or text is not a model that this version can read; the message says why.
+
+    Examples
+    --------
+    >>> from wks_segment.core import ModelFileError, PoseSegmentation
+    >>> try:
+    ...     PoseSegmentation.from_json("no model")
+    ... except ModelFileError:
+    ...     print("refused")
+    refused
+    """
 
 
 @dataclass(frozen=True)

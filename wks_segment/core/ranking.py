@@ -48,6 +48,12 @@ class Rank:
         Probability among the models of the ranking.
     fits : bool
         Whether the score is not far below the scores of the model's own poses.
+
+    Examples
+    --------
+    >>> from wks_segment.core import Rank, Ranking
+    >>> Ranking((Rank(1, -0.1, 0.98, True), Rank(0, -0.9, 0.02, False)), "sure").ranks[0].index  # as `rank` gives it
+    1
     """
 
     index: int
@@ -58,7 +64,15 @@ class Rank:
 
 @dataclass(frozen=True)
 class Ranking:
-    """Models, best first, and a verdict on the best one."""
+    """Models, best first, and a verdict on the best one.
+
+    Examples
+    --------
+    >>> from wks_segment.core import Rank, Ranking
+    >>> ranking = Ranking((Rank(1, -0.1, 0.98, True), Rank(0, -0.9, 0.02, False)), "sure")  # as `rank` gives it
+    >>> [model.index for model in ranking.ranks], ranking.verdict
+    ([1, 0], 'sure')
+    """
 
     ranks: tuple[Rank, ...]
     verdict: Verdict
@@ -81,6 +95,15 @@ class Retrieval:
         Number of queries of class i that were taken for class j.
     verdicts : dict
         For each verdict the numbers of right and of wrong answers.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from wks_segment.core import Retrieval
+    >>> verdicts = {"sure": (7, 7), "unsure": (0, 1)}
+    >>> found = Retrieval(["cat", "dog"], np.array([[3, 1], [0, 4]]), verdicts)  # as `retrieve` gives it
+    >>> int(np.trace(found.confusion))  # right answers
+    7
     """
 
     names: list[str]
@@ -104,7 +127,14 @@ class Retrieval:
 
 
 def described_alike(models: Sequence[PoseSegmentation]) -> list[list[int]]:
-    """Indices of models in groups; the models of a group take the same signature of a pose."""
+    """Indices of models in groups; the models of a group take the same signature of a pose.
+
+    Examples
+    --------
+    >>> from wks_segment.core import PoseSegmentation, described_alike
+    >>> described_alike([PoseSegmentation(), PoseSegmentation(n_segments=5), PoseSegmentation(n_eigenpairs=100)])
+    [[0, 1], [2]]
+    """
     groups: dict[tuple[object, ...], list[int]] = {}
     for i, model in enumerate(models):
         groups.setdefault((*sorted(model.describing().items()), model.pieces), []).append(i)
@@ -131,6 +161,18 @@ def rank(models: Iterable[PoseSegmentation], poses: Iterable[Iterable[PoseSignat
     ------
     ValueError
         If there is no model or no pose, or a signature was made with other settings than those of the model.
+
+    Examples
+    --------
+    >>> from examples.tube import tube
+    >>> from wks_segment.core import PoseSegmentation, rank
+    >>> thin, short = (
+    ...     PoseSegmentation(n_segments=2, n_eigenpairs=40).fit([tube(0.2, length), tube(0.8, length)])
+    ...     for length in (4.0, 1.5)
+    ... )
+    >>> pose = thin.describe_all([tube(0.5)])
+    >>> rank([short, thin], [pose, pose]).ranks[0].index  # the second model fits best
+    1
     """
     models, poses = as_list(models, "models"), [as_list(described, "poses") for described in as_list(poses, "poses")]
     if not models or len(models) != len(poses) or not all(poses):
@@ -191,6 +233,18 @@ def retrieve(models: Mapping[str, PoseSegmentation], queries: Mapping[str, Seque
         Fitted model of each class, all with the same settings.
     queries
         Shapes of each class that were not learned, described with these settings.
+
+    Examples
+    --------
+    >>> from examples.tube import tube
+    >>> from wks_segment.core import PoseSegmentation, retrieve
+    >>> thin, short = (
+    ...     PoseSegmentation(n_segments=2, n_eigenpairs=40).fit([tube(0.2, length), tube(0.8, length)])
+    ...     for length in (4.0, 1.5)
+    ... )
+    >>> queries = {"thin": thin.describe_all([tube(0.5)]), "short": short.describe_all([tube(0.5, 1.5)])}
+    >>> retrieve({"thin": thin, "short": short}, queries).confusion.tolist()
+    [[1, 0], [0, 1]]
     """
     names = list(models)
     confusion = np.zeros((len(names), len(names)), dtype=np.int64)

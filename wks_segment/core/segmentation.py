@@ -115,6 +115,19 @@ class PoseSegmentation(PoseLabeling, Estimator):
         score that it has.
     part_notes_ : PartNotes
         Names and colors that a user gave to parts, and which parts are merged; only kept with the model.
+
+    Examples
+    --------
+    >>> from examples.tube import tube
+    >>> from wks_segment.core import PoseSegmentation
+    >>> model = PoseSegmentation(n_segments=2, n_eigenpairs=40).fit([tube(0.2), tube(0.8), tube(1.4)])
+    >>> labels = model.segment_faces(tube(1.1))  # a pose that was never seen
+    >>> labels.shape, len(set(labels.tolist()))
+    ((576,), 2)
+    >>> model.predict_soft(tube(1.1)).sum(axis=1).round(6).min().item()
+    1.0
+    >>> model.with_segments(1).n_segments_
+    1
     """
 
     usual_scores_: FloatArray
@@ -259,7 +272,7 @@ class PoseSegmentation(PoseLabeling, Estimator):
         ----------
         n_segments : int or "auto"
             As for a new model, but at most the number of components.
-        poses, optional
+        poses : sequence of PoseSignature, optional
             The learned poses, as `describe_all` gives them together. `segment_regions` then finds the regions of the
             new segments; without them it finds the learned ones, which also serve `polygon_sides`.
         rest : TriangleMesh, optional

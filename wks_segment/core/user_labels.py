@@ -28,6 +28,13 @@ class PartNotes:
         sRGB colors of parts, 0 to 1.
     joined
         For a part that is merged into another one, the number of that other, which is itself merged into none.
+
+    Examples
+    --------
+    >>> from wks_segment.core import PartNotes
+    >>> notes = PartNotes(names={0: "Body", 1: "Tail"}, colors={1: (0.9, 0.2, 0.1)})
+    >>> PartNotes.of_json(notes.as_json()) == notes
+    True
     """
 
     names: Mapping[int, str] = field(default_factory=dict)

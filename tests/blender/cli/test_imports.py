@@ -14,8 +14,19 @@ LATE = ("sklearn", "joblib", "scipy.stats", "scipy.optimize", "scipy.cluster", "
 """Packages that take long to import, and that nothing needs at the start."""
 MOST = {"scipy": 250, "numpy": 135}
 """Most modules of packages that are imported at the start: a fifth more than were when this was written."""
-ENABLED = "import os, bpy, wks_segment.blender as extension; extension.register(); os._exit(0)"
-"""Python code that enables the extension, as Blender does it at its start."""
+FOR_JOBS = ("scipy", "sklearn", "joblib", "threadpoolctl", "psutil", "wks_segment.batch", "wks_segment.blender.cli")
+"""What nothing needs until a job starts or a command is called."""
+ENABLED = """
+import os, time, bpy, numpy
+start = time.process_time()
+import wks_segment.blender as extension
+extension.register()
+print(time.process_time() - start, flush=True)
+os._exit(0)
+"""
+"""Python code that enables the extension, as Blender does it at its start, and prints its seconds of a processor."""
+MOST_SECONDS = 0.2
+"""Twice the tenth of a second that enabling takes after NumPy, since the tests share their processors with others."""
 
 
 def imported(*arguments):
@@ -28,21 +39,53 @@ def imported(*arguments):
     return set(re.findall(r"^import time:.*\| +([\w.]+)$", done.stderr, re.MULTILINE)), done.stdout
 
 
+def output_of(*arguments):
+    """What Python prints with these arguments, without the cost of `-X importtime`."""
+    done = subprocess.run([sys.executable, *arguments], cwd=ROOT, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr[-1000:]
+    return done.stdout
+
+
 def packages_among(modules, packages):
     return {name for name in packages if any(each == name or each.startswith(f"{name}.") for each in modules)}
 
 
 @pytest.mark.parametrize(
     "arguments",
-    [("-m", "wks_segment", "--version"), ("-m", "wks_segment", "--help"), ("-m", "wks_segment", "segment", "--help"),
-     ("-c", ENABLED)],
-    ids=["version", "help", "help of a command", "enabled"],
+    [("-m", "wks_segment", "--version"), ("-m", "wks_segment", "--help"), ("-m", "wks_segment", "segment", "--help")],
+    ids=["version", "help", "help of a command"],
 )  # fmt: skip
 def test_the_start_imports_only_what_it_needs(arguments):
     modules, _ = imported(*arguments)
     assert not packages_among(modules, LATE)
     counts = Counter(name.partition(".")[0] for name in modules)
     assert {name: counts[name] for name in MOST if counts[name] > MOST[name]} == {}
+
+
+def test_enabling_the_extension_imports_nothing_that_jobs_need():
+    modules, _ = imported("-c", ENABLED)
+    assert "wks_segment.blender.operators.learn" in modules, "otherwise this test sees nothing"
+    assert not packages_among(modules, FOR_JOBS)
+
+
+def test_enabling_the_extension_is_fast():
+    """The best of several times: of the first one, Python compiles the modules."""
+    assert min(float(output_of("-c", ENABLED)) for _ in range(4)) < MOST_SECONDS
+
+
+NAMES = """
+import sys, wks_segment.core as core
+assert "scipy" not in sys.modules
+assert sorted(sum(core.MODULES.values(), ())) == sorted(core.__all__)
+assert set(core.__all__) <= set(dir(core))
+for name in core.__all__:
+    getattr(core, name)
+assert "scipy" in sys.modules
+"""
+
+
+def test_public_names_are_imported_when_they_are_used():
+    assert output_of("-c", NAMES) == ""
 
 
 def test_version():

@@ -123,7 +123,15 @@ def test_outputs_can_be_chosen_in_the_panel(settings, materials):
     settings.write_materials = materials
     column = drawn(main_panel.WKS_SEGMENT_PT_outputs).column.return_value
     shown = [call.args[1] for call in column.prop.call_args_list]
-    expected = {"palette", "write_colors", "vertex_groups", "write_face_sets", "write_seams", "material_template"}
+    expected = {
+        "palette",
+        "write_colors",
+        "write_ucupaint",
+        "vertex_groups",
+        "write_face_sets",
+        "write_seams",
+        "material_template",
+    }
     assert expected < set(shown)
     assert column.active is materials, "the template is gray without materials"
     used = {call.args[0] for call in column.operator.call_args_list}

@@ -85,8 +85,9 @@ def character(settings):
     for loop, uv in zip(obj.data.loops, obj.data.uv_layers["Second"].uv, strict=True):
         uv.vector = [0.5 + 0.15 * number for number in obj.data.vertices[loop.vertex_index].co.xy]
     settings.write_materials = settings.write_face_sets = settings.write_seams = settings.bake_unwrap = True
+    settings.write_ucupaint = True
     settings.vertex_groups, settings.bake_size = "hard", 64
-    options = OutputOptions(materials=True, vertex_groups="hard", face_sets=True, seams=True)
+    options = OutputOptions(ucupaint=True, materials=True, vertex_groups="hard", face_sets=True, seams=True)
     write_labels(obj.data, bands(obj), options)
     select(obj)
     OPS.refresh_segments()

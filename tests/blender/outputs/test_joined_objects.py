@@ -17,7 +17,7 @@ from wks_segment.blender.props.label_set import style_of
 
 pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
-ALL = OutputOptions(materials=True, vertex_groups="hard", face_sets=True, seams=True)
+ALL = OutputOptions(ucupaint=True, materials=True, vertex_groups="hard", face_sets=True, seams=True)
 
 
 def character(name, materials, parts=0, options=ALL):

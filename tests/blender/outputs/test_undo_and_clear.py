@@ -35,6 +35,7 @@ def test_undo_restores_everything(settings, who, operator, options):
         painted(obj)
     select(obj)
     settings.write_materials = settings.write_face_sets = settings.write_seams = settings.bake_unwrap = True
+    settings.write_ucupaint = True
     settings.vertex_groups, settings.bake_size, settings.source = "hard", 64, "OBJECTS"
     settings.n_segments = 2  # each is packed by itself, for seconds
     assert OPS.learn() == {"FINISHED"}
@@ -52,6 +53,7 @@ def test_undo_restores_everything(settings, who, operator, options):
 def test_clear_after_all_outputs_restores_everything(obj, settings):
     before = scene_snapshot()
     settings.write_materials = settings.write_face_sets = settings.write_seams = settings.bake_unwrap = True
+    settings.write_ucupaint = True
     settings.vertex_groups, settings.bake_size = "soft", 64
     for _ in range(2):
         for operator in (OPS.learn, OPS.unwrap, OPS.bake, OPS.separate, OPS.clear):

@@ -46,6 +46,7 @@ OUTPUT_OPTIONS = {
 }  # fmt: skip
 """Option to setting, of commands that write labels."""
 OUTPUT_FLAGS = {
+    "--ucupaint": ("write_ucupaint", "also write the color attribute of Ucupaint's Color ID masks"),
     "--materials": ("write_materials", "also write a material for each part"),
     "--face-sets": ("write_face_sets", "also write a face set for each part"),
     "--seams": ("write_seams", "also mark the borders of parts as seams"),

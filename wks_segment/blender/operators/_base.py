@@ -13,7 +13,7 @@ from typing import ClassVar, Generic, Protocol, TypeVar
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
-from ...core import PoseSegmentation
+from ... import core
 from ...core.message import Message, message_of
 from ...core.progress import Progress
 from ..errors import ChangedError, EndedError, TooLargeError, UserError
@@ -93,7 +93,7 @@ class ComputedJob(Protocol):
         """What says whether the scene has changed."""
 
     @property
-    def model(self) -> PoseSegmentation:
+    def model(self) -> core.PoseSegmentation:
         """The model that describes the poses, for the limits of time and memory."""
 
     def compute(self, progress: Progress) -> None:

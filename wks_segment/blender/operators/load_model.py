@@ -8,7 +8,7 @@ import bpy
 from bpy.props import StringProperty
 from bpy_extras.io_utils import ImportHelper
 
-from ...core import ModelFileError, PoseSegmentation
+from ... import core
 from ...core.message import Message, message_of
 from ..errors import UserError
 from ..workflow import model_library
@@ -33,8 +33,8 @@ class WKS_SEGMENT_OT_load_model(BaseOperator, bpy.types.Operator, ImportHelper):
     def run(self, context: bpy.types.Context) -> set[str]:
         path = Path(bpy.path.abspath(self.filepath))
         try:
-            model, summary = PoseSegmentation.load(path), model_library.summary_in(path)
-        except (ModelFileError, OSError) as error:
+            model, summary = core.PoseSegmentation.load(path), model_library.summary_in(path)
+        except (core.ModelFileError, OSError) as error:
             raise UserError("{file} was not loaded: {reason}", file=path.name, reason=message_of(error)) from error
         count = model.n_segments_
         summary = summary or [Message("From {names}", names=path.name), Message("{count} segments", count=count)]

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy
-from scipy.spatial import cKDTree
 
 from ...core.mesh.triangle_mesh import FloatArray, IntArray, connected_groups
 from ..scene.attributes import read_floats
@@ -34,6 +32,8 @@ def regions_of(characters: Sequence[Character], part: int, least_share: float) -
 
 def _regions(character: Character, part: int, least_share: float) -> IntArray:
     """(p,) region of each polygon of one character, from the largest region; −1 outside of the part."""
+    import scipy
+
     labels, areas, pairs = _polygons_of(character)
     count = len(labels)
     polygons = np.flatnonzero(labels == part)
@@ -51,7 +51,7 @@ def _regions(character: Character, part: int, least_share: float) -> IntArray:
     regions = number[component]
     if (regions < 0).any():
         centers = Body.of(character).polygon_centers[polygons]
-        nearest = cKDTree(centers[regions >= 0]).query(centers[regions < 0])[1]
+        nearest = scipy.spatial.cKDTree(centers[regions >= 0]).query(centers[regions < 0])[1]
         regions[regions < 0] = regions[regions >= 0][nearest]
     result[polygons] = regions
     return result
@@ -74,6 +74,8 @@ def _numbered_like(character: Character, regions: IntArray, other: Character, kn
     Regions correspond by the polygons that they have in common if the characters have the same number of polygons, else
     by their place within the character.
     """
+    import scipy
+
     count, n_known = int(regions.max(initial=-1)) + 1, int(known.max(initial=-1)) + 1
     if not count or not n_known:
         return regions

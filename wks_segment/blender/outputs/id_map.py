@@ -7,7 +7,6 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-import scipy
 
 from ...core.files.whole_file import incomplete, whole_file
 from ...core.mesh.triangle_mesh import IntArray
@@ -49,6 +48,8 @@ class IdMapImage:
 
 def with_margin(part_map: IntArray, margin: int) -> IntArray:
     """A (size, size) map of parts, where pixels without a part take the nearest one within so many pixels."""
+    import scipy
+
     empty = part_map == NO_PART
     distance, nearest = scipy.ndimage.distance_transform_edt(empty, return_indices=True)
     return np.where(distance <= margin, part_map[tuple(nearest)], NO_PART)

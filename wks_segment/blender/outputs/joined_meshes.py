@@ -22,6 +22,7 @@ from .own_materials import KEYS, OWN_KEYS, OWN_MATERIALS
 from .part_attributes import FACE_ATTRIBUTE, VERTEX_ATTRIBUTE, labels_on
 from .part_materials import without_number
 from .seams import OUR_SEAMS
+from .ucupaint import COLOR_IDS
 from .uv_maps import UV_MAP_NAME
 from .vertex_groups import GROUP_NAME
 
@@ -30,6 +31,7 @@ ATTRIBUTES = {
     "faces": (FACE_ATTRIBUTE, "INT", "FACE"),
     "vertices": (VERTEX_ATTRIBUTE, "INT", "POINT"),
     "colors": (PART_COLORS, "BYTE_COLOR", "CORNER"),
+    "color_ids": (COLOR_IDS, "FLOAT_COLOR", "CORNER"),
     "own_materials": (OWN_MATERIALS, "INT", "FACE"),
     KEYS: (OWN_KEYS, "INT", "FACE"),
     "own_face_sets": (OWN_FACE_SETS, "INT", "FACE"),

@@ -30,6 +30,7 @@ from .overrides import ByHand, ModelLabels, by_hand, merge_parts, model_labels
 from .part_attributes import PartAttributes, has_labels, labels_on
 from .part_materials import keep_unused
 from .seams import Seams
+from .ucupaint import UcupaintColors
 from .uv_maps import UvMap
 from .vertex_groups import VertexGroups, read_groups
 from .vertex_weights import hard_weights, move_weights
@@ -37,6 +38,7 @@ from .vertex_weights import hard_weights, move_weights
 OUTPUTS: tuple[Output, ...] = (
     PartAttributes(),
     ColorAttribute(),
+    UcupaintColors(),
     Materials(),
     VertexGroups(),
     FaceSets(),
@@ -118,6 +120,7 @@ def rewrite_labels(
             weights, vertex_groups = move_weights(mesh, weights, before, labels), "soft"
     options = OutputOptions(
         colors="colors" in ledger,
+        ucupaint="color_ids" in ledger,
         materials="first_slot" in ledger or "own_materials" in ledger,
         template=template_on(mesh),
         vertex_groups=vertex_groups,

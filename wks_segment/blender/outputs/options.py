@@ -13,7 +13,7 @@ class OutputOptions:
 
     Attributes
     ----------
-    colors, materials, face_sets, seams : bool
+    colors, ucupaint, materials, face_sets, seams : bool
         Whether they are written.
     template : str
         Name of the material that the materials of parts are copies of; empty for plain ones.
@@ -24,6 +24,7 @@ class OutputOptions:
     """
 
     colors: bool = True
+    ucupaint: bool = False
     materials: bool = False
     template: str = ""
     vertex_groups: str = "none"

@@ -13,9 +13,6 @@ from mathutils import Matrix
 
 from ...core.mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ...core.message import Message
-from ...core.uv.charts import Charts
-from ...core.uv.cuts import HiddenSide, cut_open, split
-from ...core.uv.quality import UvQuality, faulty_pairs
 from ..parts import part_ids
 from ..scene.attributes import (
     new_attribute,
@@ -68,6 +65,8 @@ def unwrap_parts(context: bpy.types.Context, obj: bpy.types.Object, labels: IntA
 
 def unwrapped_message(obj: bpy.types.Object) -> Message:
     """What is told of an object that was unwrapped: figures of its active UV map."""
+    from ...core.uv.quality import UvQuality
+
     uvs = read_floats(obj.data.uv_layers.active.data, "uv", 2).astype(np.float64)
     quality = UvQuality.of(polygon_mesh(obj.data), uvs)
     return Message(
@@ -83,6 +82,10 @@ def _unwrap(copy: bpy.types.Mesh, closed: BoolArray) -> None:
     A chart that lies on itself or is uneven is split in two, and its halves are unwrapped again. What is left after
     some rounds, such as teeth of a few faces, is projected.
     """
+    from ...core.uv.charts import Charts
+    from ...core.uv.cuts import HiddenSide, cut_open, split
+    from ...core.uv.quality import faulty_pairs
+
     whole = polygon_mesh(copy)
     hidden_side = HiddenSide(whole.middle, BACK_OF_BODY)
     seams, shown = closed.copy(), np.ones(len(whole.sizes), dtype=bool)

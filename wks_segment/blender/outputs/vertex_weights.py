@@ -8,11 +8,8 @@ from typing import Any
 import bpy
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
-from scipy.spatial import cKDTree
 
-from ...core import PoseSegmentation, Workpiece
-from ...core.mesh.surface import indicator
+from ... import core
 from ...core.mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ...core.progress import Progress
 from ..parts import part_ids
@@ -37,7 +34,11 @@ def hard_weights(mesh: bpy.types.Mesh, labels: IntArray) -> dict[int, FloatArray
 
 
 def soft_weights(
-    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[Workpiece], body: Body, progress: Progress
+    model: core.PoseSegmentation,
+    poses: Sequence[Pose],
+    described: Sequence[core.Workpiece],
+    body: Body,
+    progress: Progress,
 ) -> FloatArray:
     """(n, n_segments) mean posterior, over poses of the same meshes, at each of the character's own vertices.
 
@@ -107,8 +108,14 @@ def at_own_vertices(pose: Pose, values: FloatArray, body: Body) -> tuple[FloatAr
     seen[pose.vertex_of[known]] = True
     if seen.all():
         return own, seen
+    import scipy
+
+    from ...core.mesh.surface import indicator
+
     # 1 where a polygon has a corner at a vertex.
-    around = csr_matrix((np.ones(len(body.corners[0])), body.corners), shape=(n_vertices, len(body.polygon_centers)))
+    around = scipy.sparse.csr_matrix(
+        (np.ones(len(body.corners[0])), body.corners), shape=(n_vertices, len(body.polygon_centers))
+    )
     of_polygon = indicator(pose.polygon_of, around.shape[1])
     # Polygons without area count as well, but hardly.
     areas = pose.mesh.face_areas / pose.mesh.area + np.finfo(float).eps
@@ -131,4 +138,6 @@ def _nearest_part(
 
 def _of_nearest(values: NDArray[Any], places: NDArray[Any], targets: NDArray[Any]) -> NDArray[Any]:
     """Value at the place that is nearest to each target."""
-    return values[cKDTree(places).query(targets)[1]]
+    import scipy
+
+    return values[scipy.spatial.cKDTree(places).query(targets)[1]]

@@ -13,7 +13,8 @@ PRESET_FOLDER = "wks_segment"
 PRESET_SETTINGS = (
     "source", "pose_count", "n_segments", "auto_segments", "sides", "n_eigenpairs", "n_energies", "covariance_type",
     "random_state", "smoothness", "min_share", "snap_to", "preset", "pieces", "scaling", "laplacian", "palette",
-    "write_colors", "write_materials", "write_face_sets", "write_seams", "vertex_groups", "bake_size", "bake_margin",
+    "write_colors", "write_ucupaint", "write_materials", "write_face_sets", "write_seams", "vertex_groups",
+    "bake_size", "bake_margin",
 )  # fmt: skip
 """Settings that a preset contains: not what belongs to one file, such as frames or a model."""
 

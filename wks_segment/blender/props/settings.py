@@ -15,7 +15,7 @@ from bpy.props import (
     StringProperty,
 )  # fmt: skip
 
-from ...core import PoseSegmentation
+from ... import core
 from ..errors import UserError
 from ..parts.palette import DEFAULT_PALETTE, MAX_COLORS, RECIPES
 from ..parts.part_style import SetNotes, Style
@@ -252,6 +252,12 @@ class WKSSegmentSettings(TeachSettings, bpy.types.PropertyGroup):
         name="Colors", description="Write a color attribute with one flat color for each face, and show it",
         default=True, update=_outputs_changed,
     )  # fmt: skip
+    write_ucupaint: BoolProperty(
+        name="Ucupaint",
+        description="Write the color attribute that the Color ID masks of the add-on Ucupaint read",
+        default=False,
+        update=_outputs_changed,
+    )
     write_materials: BoolProperty(
         name="Materials",
         description="Add a material slot for each segment. Clear restores the object's own materials",
@@ -364,7 +370,7 @@ class WKSSegmentSettings(TeachSettings, bpy.types.PropertyGroup):
         """The number of segments in the form that a model takes."""
         return "auto" if self.auto_segments else self.n_segments
 
-    def new_model(self) -> PoseSegmentation:
+    def new_model(self) -> core.PoseSegmentation:
         """An unfitted model with these settings; UserError if they exclude each other."""
         parameters: dict[str, Any] = {name: getattr(self, name) for name in MODEL_PARAMETERS}
         if self.auto_segments:
@@ -374,7 +380,7 @@ class WKSSegmentSettings(TeachSettings, bpy.types.PropertyGroup):
                     "robust method"
                 )
             parameters["n_segments"] = "auto"
-        return PoseSegmentation(**parameters)
+        return core.PoseSegmentation(**parameters)
 
     def labels(self) -> str:
         """Key of the label set of the model in use; empty if there is none."""

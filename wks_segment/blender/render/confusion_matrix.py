@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...core import Retrieval
+from ... import core
 from .contact_sheet import add_text, paint, picture_scene, render, width_of
 
 CELL_PIXELS = 72
@@ -22,7 +22,7 @@ RIGHT_COLOR, WRONG_COLOR, EMPTY_COLOR = (0.13, 0.42, 0.70), (0.80, 0.22, 0.16), 
 """sRGB of a cell with all queries of its class, on the diagonal and off it, and of a cell without queries."""
 
 
-def render_matrix(retrieval: Retrieval, path: Path) -> None:
+def render_matrix(retrieval: core.Retrieval, path: Path) -> None:
     """Render the confusion matrix to a PNG file; UserError if it cannot be rendered or written."""
     names, counts = retrieval.names, retrieval.confusion
     summary = f"{retrieval.right} of {retrieval.asked} right ({retrieval.rate:.1%})"

@@ -36,9 +36,9 @@ _ATTRIBUTE_TYPES = {
     "FLOAT2": _AttributeType("vector", 2, np.float32),
     "FLOAT_VECTOR": _AttributeType("vector", 3, np.float32),
     "BYTE_COLOR": _AttributeType("color_srgb", 4, np.float32),
-    "FLOAT_COLOR": _AttributeType("color_srgb", 4, np.float32),
+    "FLOAT_COLOR": _AttributeType("color", 4, np.float32),
 }
-"""By the name of the type in Blender. Colors are read and written as sRGB."""
+"""By the name of the type in Blender. Colors are read and written as they are stored: bytes as sRGB, floats linear."""
 OUR_HIDDEN_ATTRIBUTE = ".wks_segment_written"
 """Face attribute of ours that lists do not show: not 0 on faces that were written to."""
 

@@ -9,7 +9,6 @@ import bpy
 import numpy as np
 
 from ...core import TriangleMesh
-from ...core.mesh.symmetry import upright_axes
 from ...core.mesh.triangle_mesh import FloatArray, IntArray, repeats_a_vertex
 from ...core.message import Message, message_of
 from ..errors import OtherFacesError, UserError
@@ -67,6 +66,8 @@ class Pose:
     @property
     def upright(self) -> TriangleMesh:
         """The rest position, or the pose if there is none, turned so that it is symmetric in x, which points left."""
+        from ...core.mesh.symmetry import upright_axes
+
         mesh = self.mesh if self.rest is None else self.rest
         axes = upright_axes(mesh, self.axes, () if self.left is None else (self.left,))
         return TriangleMesh(mesh.vertices @ axes, mesh.faces)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.mesh.triangle_mesh import BoolArray, IntArray
-from ...core.uv.charts import PolygonMesh
 from .attributes import read_floats, read_ints
+
+if TYPE_CHECKING:
+    from ...core.uv.charts import PolygonMesh
 
 MOST_AROUND_EDGE = 8
 """All pairs among up to 9 polygons at one edge are neighbors; with more, each is a neighbor of the 8 that follow it.
@@ -36,6 +38,8 @@ def corners_of(mesh: bpy.types.Mesh) -> tuple[IntArray, IntArray]:
 
 def polygon_mesh(mesh: bpy.types.Mesh) -> PolygonMesh:
     """The polygons of a mesh as arrays."""
+    from ...core.uv.charts import PolygonMesh
+
     mesh.calc_loop_triangles()
     return PolygonMesh(
         read_floats(mesh.vertices, "co", 3).astype(np.float64), len(mesh.edges),

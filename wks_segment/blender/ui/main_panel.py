@@ -137,7 +137,7 @@ class WKS_SEGMENT_PT_outputs(SubPanel, bpy.types.Panel):
     bl_label = "Outputs"
 
     def draw(self, context: bpy.types.Context) -> None:
-        settings = self.settings(context, "palette", "write_colors", "write_materials")
+        settings = self.settings(context, "palette", "write_colors", "write_ucupaint", "write_materials")
         template = self.layout.column()
         template.active = settings.write_materials
         template.prop(settings, "material_template")

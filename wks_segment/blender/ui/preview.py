@@ -13,7 +13,6 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from ...core.mesh.surface import indicator
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ..parts.part_style import PLAIN, Style
 from ..scene import poses as reader
@@ -41,6 +40,8 @@ def preview_triangles(
     styles
         Colors of the parts of each character; the usual ones if it is missing.
     """
+    from ...core.mesh.surface import indicator
+
     corners, colors = [np.zeros((0, 3))], [np.zeros((0, 4))]
     for character, parts in labels.items():
         pose = reader.read_pose(context, character, character.name)

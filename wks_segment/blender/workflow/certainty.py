@@ -2,26 +2,35 @@
 
 from __future__ import annotations
 
-from ...core import PoseSegmentation
-from ...core.learning.merge_tree import MOST_SEGMENTS
+from typing import TYPE_CHECKING
+
+from ... import core
 from ...core.message import Message
 
+if TYPE_CHECKING:
+    from ...core.learning.merge_tree import MergeTree
 
-def certainties(model: PoseSegmentation) -> dict[int, float] | None:
+
+def certainties(model: core.PoseSegmentation) -> dict[int, float] | None:
     """Certainty beyond chance by number of segments, for 2, 3, …; None with the paper's setting."""
     if model.grouping_ is None:
         return None
-    curve = model.grouping_.curve()[:MOST_SEGMENTS]
-    return {number: round(float(share), 3) for number, share in enumerate(curve, start=1) if number > 1}
+    return {number: round(share, 3) for number, share in _curve(model.grouping_)}
 
 
-def certainty_lines(model: PoseSegmentation) -> list[str]:
+def certainty_lines(model: core.PoseSegmentation) -> list[str]:
     """A line that says how certain each number of segments is, if the number was automatic; else none."""
     if model.n_segments != "auto" or model.grouping_ is None:
         return []
-    shares = enumerate(model.grouping_.curve()[1:MOST_SEGMENTS], start=2)
-    curve = " · ".join(f"{number} {share:.2f}" for number, share in shares)
+    curve = " · ".join(f"{number} {share:.2f}" for number, share in _curve(model.grouping_))
     return [Message("Certainty by segments: {curve} ({number} taken)", curve=curve, number=model.n_segments_)]
+
+
+def _curve(grouping: MergeTree) -> list[tuple[int, float]]:
+    """Numbers of segments, 2, 3, …, with their certainty beyond chance."""
+    from ...core.learning.merge_tree import MOST_SEGMENTS
+
+    return list(enumerate(grouping.curve()[1:MOST_SEGMENTS].tolist(), start=2))
 
 
 def is_certainty(line: str) -> bool:

@@ -6,25 +6,18 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
-from ...core import (
-    Cache,
-    Connection,
-    PoseSegmentation,
-    PoseSignature,
-    SpectrumError,
-    SpectrumWarning,
-    TriangleMesh,
-    Workpiece,
-    connect,
-)
+from ... import core
 from ...core.mesh.triangle_mesh import IntArray
 from ...core.message import Message, message_of
-from ...core.poses.describe import LABELING, Duration
 from ...core.progress import Progress
 from ..errors import UserError
 from ..scene.poses import Pose
 from .report import Report
+
+if TYPE_CHECKING:
+    from ...core.poses.describe import Duration
 
 
 @dataclass(frozen=True)
@@ -47,7 +40,7 @@ class Run:
 
     report: Report
     progress: Progress = field(default_factory=Progress)
-    cache: Cache | None = None
+    cache: core.Cache | None = None
     workers: int | None = None
     on_draft: Callable[[list[IntArray]], None] | None = None
 
@@ -71,23 +64,23 @@ class Prepared:
     """
 
     originals: list[int]
-    connections: dict[int, Connection]
-    known: dict[int, PoseSignature | None]
+    connections: dict[int, core.Connection]
+    known: dict[int, core.PoseSignature | None]
 
-    def describing_share(self, model: PoseSegmentation, poses: Sequence[Pose], rest: Duration) -> float:
+    def describing_share(self, model: core.PoseSegmentation, poses: Sequence[Pose], rest: Duration) -> float:
         """Share of the time of a job that is spent on signatures; see `PoseDescriber.describing_share`."""
         return model.describing_share(self._new(poses), len(self.known), rest)
 
-    def seconds(self, model: PoseSegmentation, poses: Sequence[Pose], rest: Duration) -> float:
+    def seconds(self, model: core.PoseSegmentation, poses: Sequence[Pose], rest: Duration) -> float:
         """Estimate of the seconds of a processor that a job takes; 0 if all signatures are known."""
         share = self.describing_share(model, poses, rest)
         return model.describing_seconds(self._new(poses)) / share if share > 0 else 0.0
 
-    def _new(self, poses: Sequence[Pose]) -> list[TriangleMesh]:
+    def _new(self, poses: Sequence[Pose]) -> list[core.TriangleMesh]:
         return [poses[i].mesh for i, signature in self.known.items() if signature is None]
 
 
-def prepare(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> Prepared:
+def prepare(model: core.PoseSegmentation, poses: Sequence[Pose], run: Run) -> Prepared:
     """Connect poses, and find the signatures that are known; UserError if the core refuses a pose."""
     originals = [next((j for j in range(i) if pose.is_like(poses[j])), i) for i, pose in enumerate(poses)]
     distinct = list(dict.fromkeys(originals))
@@ -99,8 +92,8 @@ def prepare(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> Prepare
 
 
 def describe(
-    model: PoseSegmentation, poses: Sequence[Pose], run: Run, prepared: Prepared | None = None
-) -> list[Workpiece]:
+    model: core.PoseSegmentation, poses: Sequence[Pose], run: Run, prepared: Prepared | None = None
+) -> list[core.Workpiece]:
     """Describe each pose by its signature, so that it can be labeled.
 
     Equal poses are described once, and poses in the cache not at all. Raises UserError if the core refuses a pose.
@@ -118,24 +111,28 @@ def describe(
                 cache=run.cache,
                 known=list(prepared.known.values()),
             )
-        except (ValueError, SpectrumError, MemoryError) as error:
+        except (ValueError, core.SpectrumError, MemoryError) as error:
             raise UserError(message_of(error)) from error
-    described = dict(zip(distinct, map(Workpiece, signatures), strict=True))
+    described = dict(zip(distinct, map(core.Workpiece, signatures), strict=True))
     run.report.laplacians = [described[original].pose.laplacian for original in prepared.originals]
     return [described[original] for original in prepared.originals]
 
 
-def describe_to_label(model: PoseSegmentation, poses: Sequence[Pose], run: Run) -> tuple[list[Workpiece], Progress]:
+def describe_to_label(
+    model: core.PoseSegmentation, poses: Sequence[Pose], run: Run
+) -> tuple[list[core.Workpiece], Progress]:
     """`describe` for a job that labels the poses next, and the progress that is left for that."""
+    from ...core.poses.describe import LABELING
+
     prepared = prepare(model, poses, run)
     share = prepared.describing_share(model, poses, LABELING)
     described = describe(model, poses, run.with_progress(run.progress.part(0.0, share)), prepared)
     return described, run.progress.part(share, 1.0)
 
 
-def _connections(model: PoseSegmentation, poses: Sequence[Pose], progress: Progress) -> list[Connection]:
+def _connections(model: core.PoseSegmentation, poses: Sequence[Pose], progress: Progress) -> list[core.Connection]:
     """Connection of each pose: one surface in all poses of a mesh, also where islands of it meet in some."""
-    connections: list[Connection] = []
+    connections: list[core.Connection] = []
     for i, pose in enumerate(poses):
         original = next(j for j, other in enumerate(poses) if pose.is_mesh_of(other))
         if original < i:
@@ -144,7 +141,7 @@ def _connections(model: PoseSegmentation, poses: Sequence[Pose], progress: Progr
         progress(0.0, Message('Connecting "{pose}"', pose=pose.name))
         same_mesh = [other.mesh for other in poses if pose.is_mesh_of(other)]
         try:
-            connections.append(connect(*same_mesh, rest=pose.rest, pieces=model.pieces))
+            connections.append(core.connect(*same_mesh, rest=pose.rest, pieces=model.pieces))
         except ValueError as error:
             raise UserError('"{pose}": {reason}', pose=pose.name, reason=message_of(error)) from error
     return connections
@@ -159,9 +156,9 @@ def _solver_warnings(report: Report) -> Iterator[None]:
     report.warnings += dict.fromkeys(
         message_of(warning.message)
         for warning in caught
-        if isinstance(warning.message, Warning) and issubclass(warning.category, SpectrumWarning)
+        if isinstance(warning.message, Warning) and issubclass(warning.category, core.SpectrumWarning)
     )
     # Other code may have warned meanwhile in Blender's own thread.
     for warning in caught:
-        if not issubclass(warning.category, SpectrumWarning):
+        if not issubclass(warning.category, core.SpectrumWarning):
             warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)

@@ -13,7 +13,10 @@ from ..props.label_set import style_of
 from ..props.settings import LABEL_SETTINGS, WKSSegmentSettings
 from . import segment_list
 
-WRITTEN = ("write_colors", "write_materials", "material_template", "vertex_groups", "write_face_sets", "write_seams")
+WRITTEN = (
+    "write_colors", "write_ucupaint", "write_materials", "material_template", "vertex_groups", "write_face_sets",
+    "write_seams",
+)  # fmt: skip
 """Settings of what is written."""
 FOLLOWED_SETTINGS = (*LABEL_SETTINGS, "snap_to", *WRITTEN)
 """Settings that labels and outputs follow."""

@@ -5,12 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import cached_property
 from typing import Any, Protocol
 
 import bpy
 from bpy.app.handlers import persistent
 
-from ...core import MemoryCache
+from ... import core
 from ...core.mesh.triangle_mesh import IntArray
 from ...core.message import Message, message_of
 from ...core.progress import Progress
@@ -66,7 +67,6 @@ class Session:
     """
 
     def __init__(self, preview: Preview) -> None:
-        self._cache = MemoryCache()
         self._kept: dict[str, SegmentationJob] = {}
         """Jobs by name, the one that was used last at the end."""
         self._message = PassingMessage()
@@ -77,8 +77,12 @@ class Session:
         self.timer = self.on_timer
         bpy.app.handlers.load_pre.append(self._on_load)
 
+    @cached_property
+    def _cache(self) -> core.MemoryCache:
+        return core.MemoryCache()
+
     @property
-    def cache(self) -> MemoryCache:
+    def cache(self) -> core.MemoryCache:
         """The signatures, limited to the memory that the preferences allow."""
         self._cache.limit = 1_000_000 * preference(bpy.context, "cache_megabytes")
         return self._cache

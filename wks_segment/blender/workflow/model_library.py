@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from ...core import ModelFileError, PartNotes, PoseSegmentation, model_file
+from ... import core
+from ...core import PartNotes, model_file
 from ...core.message import Message, message_of
 from ..errors import UserError
 from ..parts.part_style import SetNotes
@@ -91,7 +92,7 @@ def text_of(settings: WKSSegmentSettings, uid: str) -> str:
 
 
 def learned(
-    settings: WKSSegmentSettings, model: PoseSegmentation, summary: Sequence[str], names: Sequence[str],
+    settings: WKSSegmentSettings, model: core.PoseSegmentation, summary: Sequence[str], names: Sequence[str],
     character: str, keeps_names: bool = False,
 ) -> str:  # fmt: skip
     """Keep a learned model and use it; return the key of its label set.
@@ -134,7 +135,7 @@ def learned(
     return str(row.labels())
 
 
-def adjusted(settings: WKSSegmentSettings, uid: str, model: PoseSegmentation) -> str:
+def adjusted(settings: WKSSegmentSettings, uid: str, model: core.PoseSegmentation) -> str:
     """Keep a model of the scene, if it is there, as it was applied last; return the key of its labels.
 
     That is with another number of segments or smoothness: applied again, it gives the same labels.
@@ -175,7 +176,7 @@ def store_active(settings: WKSSegmentSettings) -> None:
             setattr(row, name, getattr(settings, place))
 
 
-def add_model(settings: WKSSegmentSettings, model: PoseSegmentation, name: str, summary: Sequence[str]) -> str:
+def add_model(settings: WKSSegmentSettings, model: core.PoseSegmentation, name: str, summary: Sequence[str]) -> str:
     """Add a model with its own names and colors to the list, and use it; return the key of its label set."""
     list_active(settings)
     notes, model.part_notes_ = model.part_notes_, PartNotes()
@@ -192,7 +193,7 @@ def add_model(settings: WKSSegmentSettings, model: PoseSegmentation, name: str, 
     return str(row.labels())
 
 
-def add_once(settings: WKSSegmentSettings, model: PoseSegmentation, name: str, summary: Sequence[str]) -> str:
+def add_once(settings: WKSSegmentSettings, model: core.PoseSegmentation, name: str, summary: Sequence[str]) -> str:
     """Add a model that comes with the extension, unless it is in the list, and use it; return its label set's key."""
     source = f"{name} {blake2b(model.to_json().encode(), digest_size=8).hexdigest()}"
     for i, row in enumerate(settings.models):
@@ -239,13 +240,13 @@ def remove(settings: WKSSegmentSettings) -> None:
         _take(settings, min(index, len(settings.models) - 1))
 
 
-def loaded(path: Path) -> PoseSegmentation:
+def loaded(path: Path) -> core.PoseSegmentation:
     """The model in a file; UserError, which names the file, if it cannot be read or used."""
     try:
-        model = PoseSegmentation.load(path)
+        model = core.PoseSegmentation.load(path)
     except FileNotFoundError:
         raise UserError("{path}: there is no such file", path=path) from None
-    except (ModelFileError, OSError) as error:
+    except (core.ModelFileError, OSError) as error:
         reason = getattr(error, "strerror", None) or message_of(error)
         raise UserError("{path}: {reason}", path=path, reason=reason) from error
     if path.parent == STARTER_FOLDER:
@@ -253,22 +254,22 @@ def loaded(path: Path) -> PoseSegmentation:
     return model
 
 
-def from_text(text: str) -> PoseSegmentation:
+def from_text(text: str) -> core.PoseSegmentation:
     """The model in JSON text; UserError if it cannot be used."""
     try:
-        return PoseSegmentation.from_json(text)
+        return core.PoseSegmentation.from_json(text)
     except ValueError as error:
         raise UserError("The model in this file cannot be used: {reason}", reason=message_of(error)) from error
 
 
-def save(model: PoseSegmentation, path: Path, summary: Sequence[str]) -> None:
+def save(model: core.PoseSegmentation, path: Path, summary: Sequence[str]) -> None:
     """Write a model to a file, with the lines on what it was learned from; errors as of `PoseSegmentation.save`."""
-    model_file.write(path, json.dumps(json.loads(model.to_json()) | {LEARNED_FROM: as_json(summary)}))
+    core.model_file.write(path, json.dumps(json.loads(model.to_json()) | {LEARNED_FROM: as_json(summary)}))
 
 
 def summary_in(path: Path) -> list[str]:
     """Lines on what the model in a file was learned from; none if the file has none."""
-    return from_json(json.loads(model_file.read(path)).get(LEARNED_FROM))
+    return from_json(json.loads(core.model_file.read(path)).get(LEARNED_FROM))
 
 
 def in_folder(folder: str | Path) -> dict[str, Path]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core import Cache, PoseSegmentation, PoseSignature, Ranking, described_alike, rank
+from ... import core
 from ...core.message import Message, message_of
 from ...core.progress import Progress
 from ..errors import UserError
@@ -38,11 +38,11 @@ class NamedModel:
     """A model to rank, with its name, and its file if it is in the model folder."""
 
     name: str
-    model: PoseSegmentation
+    model: core.PoseSegmentation
     path: Path | None = None
 
 
-def verdict_message(ranking: Ranking, names: Sequence[str]) -> Message:
+def verdict_message(ranking: core.Ranking, names: Sequence[str]) -> Message:
     """The verdict of a ranking for the user, given the names of the models."""
     first, second = names[ranking.best.index], names[ranking.ranks[min(1, len(ranking.ranks) - 1)].index]
     if ranking.verdict == "unsure" and first == second:
@@ -63,7 +63,7 @@ def models_to_rank(context: bpy.types.Context, report: Report) -> list[NamedMode
     models: list[NamedModel] = []
     for name, text in model_library.all_of(context.scene.wks_segment):
         try:
-            models.append(NamedModel(name, PoseSegmentation.from_json(text)))
+            models.append(NamedModel(name, core.PoseSegmentation.from_json(text)))
         except ValueError as error:
             report.warn(Message('The model "{name}" was left out: {reason}', name=name, reason=message_of(error)))
     for files in (model_library.in_folder(model_folder(context)), model_library.starters()):
@@ -86,14 +86,16 @@ def without_copies(models: Sequence[NamedModel]) -> list[NamedModel]:
     return list(learned.values())
 
 
-def fit_warning(models: Sequence[NamedModel], described: Sequence[PoseSignature], character: str) -> Message | None:
+def fit_warning(
+    models: Sequence[NamedModel], described: Sequence[core.PoseSignature], character: str
+) -> Message | None:
     """A warning that the first of some models does not fit a character, as *Rank Models* knows it; None if it may.
 
     Only models that take the same signature as the first are compared with it, since others would need another one.
     """
-    alike = described_alike([named.model for named in models])[0]
+    alike = core.described_alike([named.model for named in models])[0]
     compared = without_copies([models[i] for i in alike])
-    ranking = rank([named.model for named in compared], [described] * len(compared))
+    ranking = core.rank([named.model for named in compared], [described] * len(compared))
     best = compared[ranking.best.index].name
     if ranking.verdict == "nothing fits":
         return Message(
@@ -116,7 +118,9 @@ def models_of(settings: WKSSegmentSettings, uid: str) -> list[NamedModel]:
     found = []
     for row in rows:
         try:
-            found.append(NamedModel(row.name, PoseSegmentation.from_json(model_library.text_of(settings, row.uid))))
+            found.append(
+                NamedModel(row.name, core.PoseSegmentation.from_json(model_library.text_of(settings, row.uid)))
+            )
         except ValueError:
             if row.uid == uid:
                 return []
@@ -134,23 +138,23 @@ def models_in_files(paths: Mapping[str, Path], report: Report) -> list[NamedMode
     return models
 
 
-def largest(models: Sequence[NamedModel]) -> PoseSegmentation:
+def largest(models: Sequence[NamedModel]) -> core.PoseSegmentation:
     """The model whose signature takes the most time and memory."""
     return max((named.model for named in models), key=lambda model: model.n_eigenpairs)
 
 
-def rank_poses(models: Sequence[NamedModel], poses: Sequence[Pose], run: Run) -> Ranking:
+def rank_poses(models: Sequence[NamedModel], poses: Sequence[Pose], run: Run) -> core.Ranking:
     """Rank models by how well they fit poses of one character; UserError if a pose cannot be described.
 
     Models with the same signature share the described poses.
     """
     fitted = [named.model for named in models]
-    described: dict[int, list[PoseSignature]] = {}
-    for alike, progress in run.progress.each(described_alike(fitted), "Reading"):
+    described: dict[int, list[core.PoseSignature]] = {}
+    for alike, progress in run.progress.each(core.described_alike(fitted), "Reading"):
         signatures = [each.pose for each in describing.describe(fitted[alike[0]], poses, run.with_progress(progress))]
         described |= dict.fromkeys(alike, signatures)
     with run.report.stage("rank"):
-        return rank(fitted, [described[i] for i in range(len(fitted))])
+        return core.rank(fitted, [described[i] for i in range(len(fitted))])
 
 
 @dataclass
@@ -165,11 +169,11 @@ class RankingJob:
     poses: list[Pose]
     guard: ChangeGuard
     report: Report
-    cache: Cache
-    ranking: Ranking | None = None
+    cache: core.Cache
+    ranking: core.Ranking | None = None
 
     @classmethod
-    def read(cls, context: bpy.types.Context, cache: Cache) -> RankingJob:
+    def read(cls, context: bpy.types.Context, cache: core.Cache) -> RankingJob:
         """Read the models, and the active character in its current pose; UserError if either cannot be used."""
         report = Report([])
         model_library.list_active(context.scene.wks_segment)
@@ -180,7 +184,7 @@ class RankingJob:
         return cls(models, report.poses, ChangeGuard(context.scene, [character]), report, cache)
 
     @property
-    def model(self) -> PoseSegmentation:
+    def model(self) -> core.PoseSegmentation:
         """The model that the limits of time and memory are checked for."""
         return largest(self.models)
 

@@ -11,16 +11,12 @@ from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
-from scipy.spatial import cKDTree
 
-from ...core import PartNotes, PoseSegmentation, Workpiece
-from ...core.draft.segments import SECONDS, draft
-from ...core.learning.taught_parts import UnlikePartsError
+from ... import core
+from ...core import PartNotes
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ...core.message import Message, message_of
-from ...core.poses.describe import LEARNING
 from ...core.progress import Progress
-from ...core.spectral.memory import available_memory
 from ..errors import TooLargeError, UserError
 from ..outputs.labels import rewrite_labels, write_labels
 from ..outputs.marked_edges import marked_pairs
@@ -82,8 +78,10 @@ class LabelRequest:
         )
 
 
-def check_limits(model: PoseSegmentation, poses: Sequence[Pose], settings: WKSSegmentSettings) -> None:
+def check_limits(model: core.PoseSegmentation, poses: Sequence[Pose], settings: WKSSegmentSettings) -> None:
     """Raise TooLargeError, with the estimate, if the signatures of poses need more time or memory than is allowed."""
+    from ...core.spectral.memory import available_memory
+
     seconds, needed = model.estimate([pose.mesh for pose in poses])
     allowed = 1e9 * settings.limit_memory or available_memory()
     if seconds <= 60 * settings.limit_minutes and needed <= allowed:
@@ -101,7 +99,9 @@ def check_limits(model: PoseSegmentation, poses: Sequence[Pose], settings: WKSSe
     )
 
 
-def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run, lesson: Lesson | None = None) -> list[Workpiece]:
+def learn(
+    model: core.PoseSegmentation, poses: Sequence[Pose], run: Run, lesson: Lesson | None = None
+) -> list[core.Workpiece]:
     """Fit a model to poses, and to the parts of a lesson if there is one; return the described poses.
 
     Raises
@@ -117,6 +117,8 @@ def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run, lesson: Less
             faces=n_faces,
             segments=model.n_segments,
         )
+    from ...core.poses.describe import LEARNING
+
     prepared = prepare(model, poses, run)
     run = _draft(model, poses, run, prepared)
     share = prepared.describing_share(model, poses, LEARNING)
@@ -134,7 +136,7 @@ def learn(model: PoseSegmentation, poses: Sequence[Pose], run: Run, lesson: Less
     return described
 
 
-def _fit_to(lesson: Lesson, model: PoseSegmentation, described: Sequence[Workpiece], first: Pose, run: Run) -> None:
+def _fit_to(lesson: Lesson, model: core.PoseSegmentation, described: Sequence[core.Workpiece], first: Pose, run: Run) -> None:
     """Fit a model to the parts of a lesson, and give it their names; parts of the same shape become one if they may.
 
     Raises
@@ -159,7 +161,7 @@ def _fit_to(lesson: Lesson, model: PoseSegmentation, described: Sequence[Workpie
             return
 
 
-def _draft(model: PoseSegmentation, poses: Sequence[Pose], run: Run, prepared: Prepared) -> Run:
+def _draft(model: core.PoseSegmentation, poses: Sequence[Pose], run: Run, prepared: Prepared) -> Run:
     """Hand a draft of each pose's labels on, if the job is long; the run with the progress that is left."""
     seconds = prepared.seconds(model, poses, LEARNING)
     if run.on_draft is None or seconds < DRAFT_ABOVE:
@@ -189,7 +191,11 @@ def _most_common(of_triangles: IntArray, polygon_of: IntArray) -> IntArray:
 
 
 def label(
-    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[Workpiece], request: LabelRequest, run: Run
+    model: core.PoseSegmentation,
+    poses: Sequence[Pose],
+    described: Sequence[core.Workpiece],
+    request: LabelRequest,
+    run: Run,
 ) -> dict[Character, IntArray]:
     """Part of each polygon of each character; one result for all poses and all objects that share a mesh."""
     labels: dict[Character, IntArray] = {}
@@ -215,7 +221,7 @@ class MeshViews:
     """One mesh in all of its poses: the poses, the same described, and the whole mesh."""
 
     poses: list[Pose]
-    described: list[Workpiece]
+    described: list[core.Workpiece]
     body: Body
 
     @property
@@ -229,7 +235,7 @@ class MeshViews:
         return [pose.polygon_of for pose in self.poses]
 
 
-def _parts_of(model: PoseSegmentation, views: MeshViews, request: LabelRequest, progress: Progress) -> IntArray:
+def _parts_of(model: core.PoseSegmentation, views: MeshViews, request: LabelRequest, progress: Progress) -> IntArray:
     """(p,) part of each polygon of a mesh."""
     two_sides = request.sides == "two"
     min_share = None if model.preset == "paper" else request.min_share
@@ -255,7 +261,7 @@ def _parts_of(model: PoseSegmentation, views: MeshViews, request: LabelRequest, 
 
 
 def soften(
-    model: PoseSegmentation, poses: Sequence[Pose], described: Sequence[Workpiece],
+    model: core.PoseSegmentation, poses: Sequence[Pose], described: Sequence[core.Workpiece],
     labels: dict[Character, IntArray], request: LabelRequest, run: Run,
 ) -> dict[Character, dict[int, FloatArray]] | None:  # fmt: skip
     """Weights of each part at each character's vertices, one result for all poses of a mesh as in `label`.
@@ -322,6 +328,7 @@ def options_of(settings: WKSSegmentSettings) -> OutputOptions:
     """What the settings ask to be written."""
     return OutputOptions(
         colors=settings.write_colors,
+        ucupaint=settings.write_ucupaint,
         materials=settings.write_materials,
         template=settings.material_template.name if settings.material_template is not None else "",
         vertex_groups=settings.vertex_groups,
@@ -340,7 +347,7 @@ def rewrite_outputs(settings: WKSSegmentSettings, mesh: bpy.types.Mesh, warnings
     rewrite_labels(mesh, options.style, settings.notes(origin.labels).joined, warnings, options)
 
 
-def stored_model(settings: WKSSegmentSettings) -> PoseSegmentation:
+def stored_model(settings: WKSSegmentSettings) -> core.PoseSegmentation:
     """The model that was learned in or loaded into this scene; UserError if there is none."""
     if not settings.model:
         raise UserError("No model yet: learn one with Learn and Segment, or load one from a file")
@@ -353,5 +360,7 @@ def filled(labels: IntArray, body: Body) -> IntArray:
     labels = np.concatenate([labels, np.full(len(places) - len(labels), -1)])
     missing = labels < 0
     if missing.any():
-        labels[missing] = labels[~missing][cKDTree(places[~missing]).query(places[missing])[1]]
+        import scipy
+
+        labels[missing] = labels[~missing][scipy.spatial.cKDTree(places[~missing]).query(places[missing])[1]]
     return labels

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...core import PoseSegmentation
+from ... import core
 from ...core.mesh.triangle_mesh import IntArray
 from ...core.message import Message
 from ..parts import part_ids
@@ -65,7 +65,7 @@ class Report:
     unwrapped: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
-    def add_model(self, model: PoseSegmentation) -> None:
+    def add_model(self, model: core.PoseSegmentation) -> None:
         """Record how many segments a fitted model has, and how certain it is of each number."""
         self.n_segments, self.certainty = model.n_segments_, certainties(model)
         self.curve = certainty_lines(model)
@@ -105,7 +105,7 @@ class Report:
         ]
 
 
-def segment_warnings(model: PoseSegmentation, report: Report) -> list[str]:
+def segment_warnings(model: core.PoseSegmentation, report: Report) -> list[str]:
     """Warning that segments of the model do not occur on any pose; none if all occur."""
     lost = model.n_segments_ - report.n_segments
     if lost <= 0:
@@ -117,7 +117,7 @@ def segment_warnings(model: PoseSegmentation, report: Report) -> list[str]:
     ]
 
 
-def absent_warnings(model: PoseSegmentation, report: Report) -> list[str]:
+def absent_warnings(model: core.PoseSegmentation, report: Report) -> list[str]:
     """Warning that segments of an applied model do not occur on the objects; none if all occur."""
     absent = model.n_segments_ - report.n_segments
     if absent <= 0:

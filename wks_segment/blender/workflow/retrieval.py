@@ -8,9 +8,8 @@ from pathlib import Path
 
 import bpy
 
-from ...core import PoseSegmentation, PoseSignature, Retrieval, retrieve
+from ... import core
 from ...core.message import Message, message_of
-from ...core.ranking import spread_evenly
 from ..errors import UserError
 from ..props.settings import WKSSegmentSettings
 from ..scene import file_formats
@@ -26,7 +25,7 @@ LEARN_CLASS_SHARE = 0.6
 """Share of a class's progress that learning takes; the rest describes the shapes that are asked for."""
 
 
-def evaluate(folder: Path, settings: WKSSegmentSettings, n_learned: int, n_frames: int, run: Run) -> Retrieval:
+def evaluate(folder: Path, settings: WKSSegmentSettings, n_learned: int, n_frames: int, run: Run) -> core.Retrieval:
     """Learn a model of each class in a folder, and find the class of the shapes that were not learned.
 
     A sub-folder is a class, and each file in it a shape; an animated file beside it is a class, and frames of its
@@ -48,8 +47,8 @@ def evaluate(folder: Path, settings: WKSSegmentSettings, n_learned: int, n_frame
     UserError
         If fewer than two classes can be used, or the settings exclude each other.
     """
-    models: dict[str, PoseSegmentation] = {}
-    queries: dict[str, list[PoseSignature]] = {}
+    models: dict[str, core.PoseSegmentation] = {}
+    queries: dict[str, list[core.PoseSignature]] = {}
     unfitted, limits = settings.new_model(), (settings.limit_minutes, settings.limit_memory)
     for (name, paths), progress in run.progress.each(_classes(folder), "Reading"):
         model = copy(unfitted)
@@ -76,10 +75,10 @@ def evaluate(folder: Path, settings: WKSSegmentSettings, n_learned: int, n_frame
         ]
         raise UserError(Message.joined("; ", reasons))
     with run.report.stage("rank"):
-        return retrieve(models, queries)
+        return core.retrieve(models, queries)
 
 
-def _check_class(model: PoseSegmentation, poses: list[Pose], n_learned: int, limits: tuple[float, float]) -> None:
+def _check_class(model: core.PoseSegmentation, poses: list[Pose], n_learned: int, limits: tuple[float, float]) -> None:
     """UserError if there are too few shapes, or they are too large for the limits of minutes and memory."""
     if len(poses) <= n_learned:
         raise UserError(
@@ -92,8 +91,10 @@ def _check_class(model: PoseSegmentation, poses: list[Pose], n_learned: int, lim
     pipeline.check_limits(model, poses, settings)
 
 
-def _learn_class(model: PoseSegmentation, poses: list[Pose], n_learned: int, run: Run) -> list[PoseSignature]:
+def _learn_class(model: core.PoseSegmentation, poses: list[Pose], n_learned: int, run: Run) -> list[core.PoseSignature]:
     """Fit the model to some of the poses; return the others described."""
+    from ...core.ranking import spread_evenly
+
     learned = spread_evenly(len(poses), n_learned)
     with run.progress.step(LEARN_CLASS_SHARE) as progress:
         pipeline.learn(model, [poses[i] for i in learned], run.with_progress(progress))

@@ -17,6 +17,7 @@ from ..outputs.overrides import by_hand
 from ..outputs.part_attributes import has_labels, labels_on
 from ..outputs.part_materials import LABELS_PROPERTY, part_of, restyle_material
 from ..outputs.separate import followed
+from ..outputs.ucupaint import recolor_ids
 from ..outputs.vertex_groups import rename_group
 from ..parts import part_ids
 from ..parts.palette import MAX_COLORS
@@ -232,6 +233,7 @@ def restyle(labels: str, part: int | None = None, name: bool = True, color: bool
                     rename_group(mesh, each, style)
                 if color:
                     recolor_faces(mesh, each, style)
+                    recolor_ids(mesh, each, style)
         for material in bpy.data.materials:
             shown = part_of(material)
             if shown is not None and part in (None, shown) and material.get(LABELS_PROPERTY, "") == labels:

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import bpy
 
-from ...core import Cache, PoseSegmentation, Workpiece
+from ... import core
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ...core.message import Message, message_of
 from ...core.progress import Progress
@@ -87,19 +87,19 @@ class SegmentationJob:
         A provisional part of each polygon of each character, once there is one, to be shown and never written.
     """
 
-    model: PoseSegmentation
+    model: core.PoseSegmentation
     poses: list[Pose]
     request: LabelRequest
     guard: ChangeGuard
     report: Report
     learns: bool
     number: int | Literal["auto"]
-    cache: Cache
+    cache: core.Cache
     values: dict[str, Any] = field(default_factory=dict)
     uid: str = ""
     name: str = ""
     compared: list[NamedModel] = field(default_factory=list)
-    described: list[Workpiece] = field(default_factory=list)
+    described: list[core.Workpiece] = field(default_factory=list)
     first: SegmentationJob | None = None
     labels: dict[Character, IntArray] = field(default_factory=dict)
     lesson: Lesson | None = None
@@ -108,7 +108,7 @@ class SegmentationJob:
     _weights: dict[Character, dict[int, FloatArray]] | None = None
 
     @classmethod
-    def learning(cls, context: bpy.types.Context, cache: Cache) -> SegmentationJob:
+    def learning(cls, context: bpy.types.Context, cache: core.Cache) -> SegmentationJob:
         """Read poses and settings to learn from; UserError if they cannot be used."""
         settings, report = context.scene.wks_segment, Report([])
         with report.stage("read"):
@@ -119,7 +119,7 @@ class SegmentationJob:
         return cls._read(context, settings.new_model(), report, cache, learns=True)
 
     @classmethod
-    def teaching(cls, context: bpy.types.Context, cache: Cache) -> SegmentationJob:
+    def teaching(cls, context: bpy.types.Context, cache: core.Cache) -> SegmentationJob:
         """Read the parts of the selected characters, and poses to learn them from; UserError if they cannot be used."""
         settings, report = context.scene.wks_segment, Report([])
         with report.stage("read"):
@@ -133,7 +133,7 @@ class SegmentationJob:
 
     @classmethod
     def applying(
-        cls, context: bpy.types.Context, cache: Cache, model: PoseSegmentation | None = None,
+        cls, context: bpy.types.Context, cache: core.Cache, model: core.PoseSegmentation | None = None,
         objects: Sequence[bpy.types.Object] = (), uid: str = "", keeps_number: bool = False,
     ) -> SegmentationJob:  # fmt: skip
         """Read objects to apply a model to: the selected ones and the model in use if none are given.
@@ -177,7 +177,7 @@ class SegmentationJob:
 
     @classmethod
     def _read(
-        cls, context: bpy.types.Context, model: PoseSegmentation, report: Report, cache: Cache, learns: bool,
+        cls, context: bpy.types.Context, model: core.PoseSegmentation, report: Report, cache: core.Cache, learns: bool,
         uid: str = "",
     ) -> SegmentationJob:  # fmt: skip
         settings, poses = context.scene.wks_segment, report.poses
@@ -324,7 +324,7 @@ class SegmentationJob:
         return model_library.adjusted(settings, self.uid, copy(self.model))
 
 
-def _show_number_of(model: PoseSegmentation, settings: WKSSegmentSettings, report: Report) -> None:
+def _show_number_of(model: core.PoseSegmentation, settings: WKSSegmentSettings, report: Report) -> None:
     """Show the number of a taught model's segments in the field; the report is told if another one was asked for."""
     number = min(model.n_segments_, MAX_COLORS)
     if settings.number() in ("auto", number):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...core import PoseSegmentation
+from ... import core
 from ...core.progress import Progress
 from ..scene.poses import Pose
 from .segmentation_job import SegmentationJob
@@ -23,7 +23,7 @@ class UpdateJob:
         return [pose for job in self.jobs for pose in job.poses]
 
     @property
-    def model(self) -> PoseSegmentation:
+    def model(self) -> core.PoseSegmentation:
         """The model whose signature takes the most time and memory."""
         return max((job.model for job in self.jobs), key=lambda model: model.n_eigenpairs)
 

@@ -72,6 +72,15 @@ class GaussianMixture:
     means : (K, d) array
     covariances : array
         (d,) for "shared", (K, d) for "diag", (K,) for "spherical", (d, d) for "tied", (K, d, d) for "full".
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from wks_segment.core import fit_mixture
+    >>> samples = np.concatenate([np.zeros((50, 1)), np.ones((50, 1))]) + np.linspace(0, 0.1, 100)[:, None]
+    >>> mixture = fit_mixture(samples, np.ones(100), n_components=2, random_state=0)
+    >>> mixture.weights.round(2).tolist()
+    [0.5, 0.5]
     """
 
     covariance_type: CovarianceType
@@ -159,6 +168,15 @@ def fit_mixture(
         If there are fewer distinct samples than components.
     ValueError
         If the covariance type is unknown.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from wks_segment.core import fit_mixture
+    >>> samples = np.concatenate([np.zeros((50, 1)), np.ones((50, 1))]) + np.linspace(0, 0.1, 100)[:, None]
+    >>> mixture = fit_mixture(samples, np.ones(100), n_components=2, random_state=0)
+    >>> sorted(mixture.means.ravel().round(2).tolist())
+    [0.02, 1.08]
     """
     if covariance_type not in get_args(CovarianceType):
         raise ValueError(

@@ -77,6 +77,14 @@ class Surface:
         The faces of `original` with one number for all vertices that are welded: neighbors on the surface share edges.
     mirror : Mirror or None
         Mirror images of the faces of `original`, at rest; None if it is not symmetric.
+
+    Examples
+    --------
+    >>> from examples.tube import tube
+    >>> from wks_segment.core import prepare_surface
+    >>> surface = prepare_surface(tube(0.5))
+    >>> surface.n_islands, round(float(surface.mesh.area), 6)
+    (1, 1.0)
     """
 
     original: TriangleMesh
@@ -151,6 +159,14 @@ class Connection:
     reference : (n, 3) array or None
         The vertices at rest, or in the pose whose limbs are stretched out most: holes are closed and edges halved alike
         in all poses, by their lengths there. None if the mesh is the only pose: by its own lengths.
+
+    Examples
+    --------
+    >>> from examples.tube import tube
+    >>> from wks_segment.core import connect, prepare_surface
+    >>> connection = connect(tube(0.0), tube(1.0))
+    >>> prepare_surface(tube(0.5), connection=connection).n_islands
+    1
     """
 
     welded: IntArray
@@ -186,6 +202,14 @@ def connect(*poses: TriangleMesh, rest: TriangleMesh | None = None, pieces: Isla
     ------
     ValueError
         If no face is left after welding.
+
+    Examples
+    --------
+    >>> from examples.tube import tube
+    >>> from wks_segment.core import connect
+    >>> connection = connect(tube(0.0), tube(1.0))  # two poses of one mesh
+    >>> len(connection.ties)  # it is one island
+    0
     """
     welded = weld(*poses, *([] if rest is None else [rest]))
     first = poses[0] if rest is None else rest
@@ -244,6 +268,13 @@ def prepare_surface(
     ------
     ValueError
         If no face is left after welding.
+
+    Examples
+    --------
+    >>> from examples.tube import tube
+    >>> from wks_segment.core import prepare_surface
+    >>> tube(0.5).n_vertices, prepare_surface(tube(0.5), min_vertices=900).mesh.n_vertices > 900
+    (290, True)
     """
     connection = connection or connect(mesh, pieces=pieces)
     welded_faces = connection.welded[mesh.faces]

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ..message import Message
 
@@ -40,6 +38,13 @@ class TriangleMesh:
     ValueError
         If an array has the wrong shape, a coordinate is not finite, an index is out of range, a face uses a vertex
         twice, there is no face, or the surface has no area. The message names the first such vertex or face.
+
+    Examples
+    --------
+    >>> from wks_segment.core import TriangleMesh
+    >>> mesh = TriangleMesh([[0, 0, 0], [2, 0, 0], [0, 2, 0]], [[0, 1, 2]])
+    >>> mesh.n_vertices, float(mesh.area)
+    (3, 2.0)
     """
 
     def __init__(
@@ -224,9 +229,11 @@ def _checked_lengths(lengths: ArrayLike, n_faces: int) -> FloatArray:
 
 def connected_groups(pairs: IntArray, count: int) -> IntArray:
     """(count,) connected group of each node of a graph with (p, 2) edges, numbered 0, 1, … by the lowest node."""
+    import scipy  # late, since Blender imports this module when it starts
+
     first, second = pairs.T
-    graph = coo_matrix((np.ones(len(pairs), dtype=np.int8), (first, second)), shape=(count, count))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    graph = scipy.sparse.coo_matrix((np.ones(len(pairs), dtype=np.int8), (first, second)), shape=(count, count))
+    return scipy.sparse.csgraph.connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def islands_of_vertices(faces: IntArray, n_vertices: int, links: IntArray | None = None) -> IntArray:

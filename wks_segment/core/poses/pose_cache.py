@@ -96,6 +96,15 @@ class Workpiece:
         Outward normals of the surface.
     results : ResultCache
         Intermediate results of models on this pose.
+
+    Examples
+    --------
+    >>> from examples.tube import tube
+    >>> from wks_segment.core import PoseSegmentation, Workpiece
+    >>> model = PoseSegmentation(n_segments=2, n_eigenpairs=40).fit([tube(0.2), tube(0.8), tube(1.4)])
+    >>> work = Workpiece(model.describe_all([tube(1.1)])[0])
+    >>> bool((model.segment_faces(work) == model.segment_faces(tube(1.1))).all())  # the second call is quick
+    True
     """
 
     def __init__(self, pose: PoseSignature) -> None:

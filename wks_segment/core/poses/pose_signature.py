@@ -32,6 +32,14 @@ class PoseSignature:
         Number of eigenpairs that the signature was computed from.
     laplacian : "cotangent" or "delaunay"
         The triangles that the Laplacian was computed on.
+
+    Examples
+    --------
+    >>> from examples.tube import tube
+    >>> from wks_segment.core import PoseSegmentation
+    >>> [described] = PoseSegmentation(n_eigenpairs=40).describe_all([tube(0.5)])
+    >>> described.signature.shape[1]  # energies
+    100
     """
 
     surface: Surface

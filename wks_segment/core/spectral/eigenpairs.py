@@ -90,6 +90,16 @@ def eigenpairs(
         If the checks after the solve fail.
     MemoryError
         If the solve needs more memory than is free; the message gives both figures.
+
+    Examples
+    --------
+    >>> from examples.tube import tube
+    >>> from wks_segment.core import eigenpairs
+    >>> values, functions = eigenpairs(tube(0.5), n_pairs=20)
+    >>> values.shape, functions.shape
+    ((20,), (290, 20))
+    >>> bool(abs(values[0]) < 1e-6)  # the constant function
+    True
     """
     values, place, panels = eigenpair_panels(mesh, n_pairs, accuracy, progress)
     functions: FloatArray | None = None

@@ -64,6 +64,14 @@ def delaunay(mesh: TriangleMesh) -> TriangleMesh:
     -------
     Mesh with the same n vertices and m faces, or 2 m faces in two layers, with `lengths`. A face may use a vertex
     twice: an edge can run around a thin limb and end where it begins.
+
+    Examples
+    --------
+    >>> from examples.tube import tube
+    >>> from wks_segment.core import delaunay, stiffness_matrix
+    >>> weights = stiffness_matrix(delaunay(tube(0.5, around=5)))
+    >>> bool((weights - weights.multiply(weights > 0)).nnz)  # off the diagonal all are negative or zero
+    True
     """
     _, edge, count = unique_edges(mesh.faces)
     layers = 1 if (count == 2).all() else 2

@@ -54,7 +54,14 @@ LANCZOS_TOLERANCE = 1e-10
 
 
 class SpectrumError(RuntimeError):
-    """The eigenpairs could not be computed with the required accuracy."""
+    """The eigenpairs could not be computed with the required accuracy.
+
+    Examples
+    --------
+    >>> from wks_segment.core import SpectrumError
+    >>> issubclass(SpectrumError, Exception)
+    True
+    """
 
 
 def lanczos_eigenpairs(

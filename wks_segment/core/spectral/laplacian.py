@@ -33,6 +33,13 @@ def stiffness_matrix(mesh: TriangleMesh) -> csc_matrix:
     Returns
     -------
     (n, n) symmetric, positive semi-definite sparse matrix; without unit (it does not change with scale).
+
+    Examples
+    --------
+    >>> from examples.tube import tube
+    >>> from wks_segment.core import stiffness_matrix
+    >>> bool(abs(stiffness_matrix(tube(0.5)).sum(axis=1)).max() < 1e-9)  # a constant has no energy
+    True
     """
     i, j = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     i, j = np.append(i, mesh.links[:, 0]), np.append(j, mesh.links[:, 1])
@@ -65,6 +72,14 @@ def mass_matrix(mesh: TriangleMesh, lumped: bool = True) -> csc_matrix:
     Returns
     -------
     (n, n) symmetric sparse matrix in squared units of the vertices; its entries sum to the area.
+
+    Examples
+    --------
+    >>> from examples.tube import tube
+    >>> from wks_segment.core import mass_matrix
+    >>> mesh = tube(0.5)
+    >>> bool(abs(mass_matrix(mesh).sum() - mesh.area) < 1e-9)
+    True
     """
     if lumped:
         return csc_matrix(diags(mesh.vertex_areas))

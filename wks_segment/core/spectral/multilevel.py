@@ -78,7 +78,19 @@ CHUNK = 1024
 
 
 class SpectrumWarning(UserWarning):
-    """The eigenpairs differ from those that were asked for: there are fewer, or they are less accurate."""
+    """The eigenpairs differ from those that were asked for: there are fewer, or they are less accurate.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> from examples.tube import tube
+    >>> from wks_segment.core import SpectrumWarning, eigenpairs
+    >>> with warnings.catch_warnings(record=True) as told:
+    ...     warnings.simplefilter("always", SpectrumWarning)
+    ...     values, _ = eigenpairs(tube(0.5, rings=4, around=4), n_pairs=50)
+    >>> len(values), len(told)  # the mesh has 18 vertices only
+    (18, 1)
+    """
 
 
 class NotConvergedError(ArithmeticError):

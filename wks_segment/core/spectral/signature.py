@@ -52,6 +52,13 @@ def wave_kernel_signature(values: ArrayLike, functions: ArrayLike, n_energies: i
     ------
     ValueError
         If the shapes do not match, or fewer than two eigenvalues are above zero.
+
+    Examples
+    --------
+    >>> from examples.tube import tube
+    >>> from wks_segment.core import eigenpairs, wave_kernel_signature
+    >>> wave_kernel_signature(*eigenpairs(tube(0.5), n_pairs=30), n_energies=10).shape
+    (290, 10)
     """
     values, functions = _checked_pairs(values, functions)
     return _weighted_squares(_one_panel(functions), _energy_weights(values, n_energies), functions.shape[0])
@@ -126,6 +133,13 @@ def heat_kernel_signature(
     ------
     ValueError
         If the shapes do not match, or no eigenvalue is above zero.
+
+    Examples
+    --------
+    >>> from examples.tube import tube
+    >>> from wks_segment.core import eigenpairs, heat_kernel_signature
+    >>> heat_kernel_signature(*eigenpairs(tube(0.5), n_pairs=30), n_times=10).shape
+    (290, 10)
     """
     values, functions = _checked_pairs(values, functions)
     if times is None:

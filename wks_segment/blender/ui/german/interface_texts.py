@@ -186,6 +186,8 @@ GERMAN_INTERFACE = {
     "Add a material slot for each segment. Clear restores the object's own materials": "Einen Material-Slot für jedes Segment hinzufügen. Leeren stellt die eigenen Materialien des Objekts wieder her",
     "Template": "Vorlage",
     "Material to copy for each segment, with the color in its Base Color or in the RGB node before it": "Material, das für jedes Segment kopiert wird, mit der Farbe in seiner Base Color oder im RGB-Node davor",
+    "Ucupaint": "Ucupaint",
+    "Write the color attribute that the Color ID masks of the add-on Ucupaint read": "Das Farbattribut schreiben, das die Color-ID-Masken des Add-ons Ucupaint lesen",
     "Face Sets": "Face Sets",
     "Write a sculpting face set for each segment. Clear restores the object's own face sets": "Ein Face Set für jedes Segment schreiben. Leeren stellt die eigenen Face Sets des Objekts wieder her",
     "Mark the borders of segments as UV seams, in addition to the object's own seams": "Die Grenzen der Segmente als UV-Nähte markieren, zusätzlich zu den eigenen Nähten des Objekts",

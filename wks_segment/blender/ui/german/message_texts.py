@@ -178,6 +178,12 @@ GERMAN_MESSAGES = {
     'The image "{name}" has been changed since it was baked, and stays': (
         'Das Bild "{name}" wurde seit dem Backen geändert und bleibt'
     ),
+    '"{mesh}" has color IDs of Ucupaint already, they stay as they are': (
+        '"{mesh}" hat schon Farb-IDs von Ucupaint, sie bleiben, wie sie sind'
+    ),
+    'You have changed the color IDs of "{mesh}" in Ucupaint, they stay': (
+        'Die Farb-IDs von "{mesh}" haben Sie in Ucupaint geändert, sie bleiben'
+    ),
     "You have changed these materials, they stay in the file: {names}": (
         "Diese Materialien haben Sie geändert, sie bleiben in der Datei: {names}"
     ),
