@@ -7,7 +7,7 @@ import pytest
 from shapes import creature, figure
 
 from wks_segment.core import ModelFileError, PoseSegmentation
-from wks_segment.core.learning.taught_parts import UnlikePartsError
+from wks_segment.core.user_labels import UnlikePartsError
 
 SMALL = {"n_eigenpairs": 80, "n_energies": 40}
 BENDS = (0.0, 0.5)

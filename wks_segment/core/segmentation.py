@@ -23,7 +23,6 @@ from .learning.parameters import Estimator, NSegments, Preset, check_parameters,
 from .learning.part_mixture import PartMixture, learn_parts
 from .learning.standardizer import Scaling, Standardizer
 from .learning.taught_mixture import learn_taught_parts
-from .learning.taught_parts import Unlabeled
 from .learning.training_samples import TrainingSamples
 from .mesh.surface import IslandMode
 from .mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
@@ -36,7 +35,7 @@ from .spectral.eigenpairs import Accuracy
 from .spectral.intrinsic_delaunay import Laplacian
 from .spectral.laplacian import unit_area_masses
 from .threads import one_blas_thread, one_thread
-from .user_labels import PartNotes
+from .user_labels import PartNotes, Unlabeled
 
 GROUPED, RECOGNIZED = 0.63, 0.9
 """Shares of the time of learning from described poses after which the parts are found and merged, and their regions

@@ -1,10 +1,10 @@
-"""Names, colors and merges that a user gave to the parts of a model. The core only keeps them with the model."""
+"""What a user says of parts: names, colors and merges, which the core only keeps with the model; and taught labels."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 from .message import Message
 
@@ -12,8 +12,28 @@ MOST_PARTS = 3000
 """Parts are numbered below this: segments up to 1000, and their left and right sides."""
 LONGEST_NAME = 50
 """Maximum length of a name in letters: Blender cuts names off at 63 bytes, and vertex groups have a word before it."""
+NOT_SAID = -1
+"""Label of a face whose part is not said, when parts are taught."""
+LEAST_FACES = 3
+"""Fewest faces of a taught part on all learned meshes together: with fewer, a slip of the brush would be a part."""
 Color = tuple[float, float, float]
+Unlabeled = Literal["learn", "ignore"]
 Note = TypeVar("Note")
+
+
+class UnlikePartsError(ValueError):
+    """Two taught parts are alike and not left and right; `parts` are their numbers."""
+
+    def __init__(self, first: int, second: int) -> None:
+        super().__init__(
+            Message(
+                "parts {first} and {second} cannot be told apart: they have the same shape, and are not left and "
+                "right of each other. Teach them as one part",
+                first=first,
+                second=second,
+            )
+        )
+        self.parts = first, second
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...core.learning.taught_parts import LEAST_FACES
 from ...core.mesh.triangle_mesh import IntArray
 from ...core.message import Message
-from ...core.user_labels import LONGEST_NAME
+from ...core.user_labels import LEAST_FACES, LONGEST_NAME
 from ...rigs import split_side
 from ..errors import UserError
 from ..parts import part_ids

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ... import core
-from ...core import PartNotes, model_file
+from ...core import PartNotes
 from ...core.message import Message, message_of
 from ..errors import UserError
 from ..parts.part_style import SetNotes

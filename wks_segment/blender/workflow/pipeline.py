@@ -17,6 +17,7 @@ from ...core import PartNotes
 from ...core.mesh.triangle_mesh import FloatArray, IntArray
 from ...core.message import Message, message_of
 from ...core.progress import Progress
+from ...core.user_labels import UnlikePartsError
 from ..errors import TooLargeError, UserError
 from ..outputs.labels import rewrite_labels, write_labels
 from ..outputs.marked_edges import marked_pairs
@@ -136,7 +137,9 @@ def learn(
     return described
 
 
-def _fit_to(lesson: Lesson, model: core.PoseSegmentation, described: Sequence[core.Workpiece], first: Pose, run: Run) -> None:
+def _fit_to(
+    lesson: Lesson, model: core.PoseSegmentation, described: Sequence[core.Workpiece], first: Pose, run: Run
+) -> None:
     """Fit a model to the parts of a lesson, and give it their names; parts of the same shape become one if they may.
 
     Raises
@@ -163,6 +166,9 @@ def _fit_to(lesson: Lesson, model: core.PoseSegmentation, described: Sequence[co
 
 def _draft(model: core.PoseSegmentation, poses: Sequence[Pose], run: Run, prepared: Prepared) -> Run:
     """Hand a draft of each pose's labels on, if the job is long; the run with the progress that is left."""
+    from ...core.draft.segments import SECONDS, draft
+    from ...core.poses.describe import LEARNING
+
     seconds = prepared.seconds(model, poses, LEARNING)
     if run.on_draft is None or seconds < DRAFT_ABOVE:
         return run

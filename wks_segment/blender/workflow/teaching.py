@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ...core.learning.taught_parts import LEAST_FACES, NOT_SAID, Unlabeled
 from ...core.mesh.triangle_mesh import IntArray
 from ...core.message import Message, message_of
+from ...core.user_labels import LEAST_FACES, NOT_SAID, Unlabeled
 from ...rigs import parts_of_faces, split_side
 from ..errors import UserError
 from ..outputs.taught_parts import BONES, TaughtParts, taught_parts

@@ -10,12 +10,13 @@ import numpy as np
 
 from ..learning.parameters import Preset
 from ..learning.part_mixture import PartMixture
-from ..learning.taught_parts import TaughtLabels, TaughtParts, Unlabeled, UnlikePartsError, checked_labels
+from ..learning.taught_parts import TaughtLabels, TaughtParts, checked_labels
 from ..mesh.triangle_mesh import IntArray, TriangleMesh
 from ..message import Message
 from ..poses.arguments import as_list
 from ..poses.pose_cache import AnyPose, Workpiece
 from ..progress import Progress
+from ..user_labels import Unlabeled, UnlikePartsError
 from .labeler import Labeler
 from .region_atlas import RegionAtlas
 from .taught_sides import UNKNOWN_SIDE, oriented, sides_by_labels

@@ -15,11 +15,12 @@ from ..poses.pose_cache import Workpiece
 from ..poses.pose_signature import of_one_mesh
 from ..poses.signature_cache import Cache
 from ..progress import Progress
+from ..user_labels import NOT_SAID
 from .gaussian_mixture import CovarianceType, GaussianMixture
 from .merge_tree import MOST_LIKENESS, MergeTree
 from .parameters import effective, least_segments
 from .part_mixture import PartMixture, fitted_inside, kinds_of, principal_axes
-from .taught_parts import NOT_SAID, TaughtLabels, TaughtParts, alike_parts, with_like_neighbors
+from .taught_parts import TaughtLabels, TaughtParts, alike_parts, with_like_neighbors
 from .training_samples import TrainingSamples
 
 COMPONENTS_OF_MESH, COMPONENTS_OF_BODIES = 40, 6

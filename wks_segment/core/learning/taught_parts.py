@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -16,13 +15,10 @@ from scipy.spatial import cKDTree
 from ..files.checked_json import DamagedError
 from ..mesh.triangle_mesh import FloatArray, IntArray
 from ..message import Message
+from ..user_labels import LEAST_FACES, NOT_SAID, Unlabeled
 from .merge_tree import TWO_PARTS, MergeTree
 from .parameters import NSegments
 
-NOT_SAID = -1
-"""Label of a face whose part is not said."""
-LEAST_FACES = 3
-"""Fewest faces of a part on all learned meshes together: with fewer, a slip of the brush would be a part."""
 MOST_PARTS = 500
 """Most taught parts: segments made by hand have the numbers from here in Blender."""
 MOST_COMPARED = 400
@@ -36,8 +32,6 @@ MUCH_NEARER = 0.6
 can all be somewhat alike. It is up to 0.55 for mirrored parts of four of five scans."""
 LEAST_COMMON = 0.5
 """Share of the borders of two mirrored parts that is with the same parts, from which they are mirrored; at best 1."""
-
-Unlabeled = Literal["learn", "ignore"]
 
 
 @dataclass(frozen=True)
@@ -57,21 +51,6 @@ class TaughtLabels:
     of_faces: list[IntArray]
     unlabeled: Unlabeled
     apart: frozenset[tuple[int, int]] = frozenset()
-
-
-class UnlikePartsError(ValueError):
-    """Two taught parts are alike and not left and right; `parts` are their numbers."""
-
-    def __init__(self, first: int, second: int) -> None:
-        super().__init__(
-            Message(
-                "parts {first} and {second} cannot be told apart: they have the same shape, and are not left and "
-                "right of each other. Teach them as one part",
-                first=first,
-                second=second,
-            )
-        )
-        self.parts = first, second
 
 
 @dataclass(frozen=True)
