@@ -3,7 +3,7 @@
 import pytest
 
 BODY = "Creature"
-MAX_CLICKS = 12
+MAX_CLICKS = 10
 """Largest number of clicks from the ZIP to a baked ID map."""
 
 EMPTY_COLOR = "0 0 0 255"
