@@ -18,7 +18,7 @@ from ..learning.standardizer import Standardizer
 from ..mesh.adjacency import FaceAdjacency
 from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
 from ..parts.kind_traits import KindTraits
-from ..poses.pose_cache import Kind, ResultKey, Workpiece
+from ..poses.pose_cache import Kind, ResultKey, Workpiece, smooth_means
 from ..poses.pose_signature import PoseSignature, of_one_mesh
 from ..progress import Progress
 from .learned_areas import with_learned_areas
@@ -38,6 +38,8 @@ regions are bands between two other segments where the signature passes through 
 "head" between back and tail."""
 VOTERS = 5
 """Number of poses of a mesh that vote on its sides; more poses hardly change the result."""
+MOST_LEARNED = 3
+"""Number of poses of a mesh whose traits are learned."""
 MOST_POSTERIORS = 3_000_000
 """Maximum number of posteriors of kinds that are kept with a pose; above it, only those of segments are computed, to
 save memory."""
@@ -87,8 +89,7 @@ class Labeler:
 
     def smoothed(self, pose: Workpiece, n_groups: int) -> FloatArray:
         """(n', n_groups) smoothed posteriors of groups at the vertices of a pose."""
-        raw = self._kept(pose, n_groups)
-        return pose.flows.over(self.length).smooth(raw) if self.length > 0 else raw
+        return self._smooth([pose], n_groups)(pose)
 
     def segments(
         self,
@@ -159,7 +160,7 @@ class Labeler:
         progress: Progress,
     ) -> IntArray:
         """(p,) side of each polygon, given the segments; see `PoseSegmentation.polygon_sides`."""
-        voters = sorted(set(np.linspace(0, len(poses) - 1, VOTERS).round().astype(int).tolist()))
+        voters = _spread_over(poses, VOTERS)
         votes: list[IntArray] = []
         for together, step in _steps([poses[i] for i in voters], progress):
             regions = self._regions(atlas.n_groups, together, self.min_share, step.part(0.0, LABELS_SHARE))
@@ -182,7 +183,9 @@ class Labeler:
         for together, step in _steps(poses, progress):
             regions = self._regions(n_groups, together, self.min_share, step.part(0.0, LABELS_SHARE))
             of_meshes.append(regions)
-            for pose, _ in step.part(LABELS_SHARE, 1.0).each(together):
+            for pose, _ in step.part(LABELS_SHARE, 1.0).each(
+                [together[i] for i in _spread_over(together, MOST_LEARNED)]
+            ):
                 traits.append(self._traits(regions, pose, len(together)))
         centers = of_meshes[0].centers(first if rest is None else rest)
         return RegionAtlas.learned(n_groups, traits, centers, alike=len(of_meshes) == 1)
@@ -244,7 +247,8 @@ class Labeler:
     ) -> Callable[[Workpiece], FloatArray]:
         """Function that gives the (m, n_groups) posteriors on the faces of one of the poses of a mesh."""
         if self.traits is None or self.length == 0:
-            return lambda pose: pose.surface.to_faces(self.smoothed(pose, n_groups))
+            smooth = self._smooth(poses, n_groups)
+            return lambda pose: pose.surface.to_faces(smooth(pose))
         together = poses if of_one_mesh(_pose_signatures(poses)) else None
 
         def on_faces(pose: Workpiece) -> FloatArray:
@@ -252,6 +256,10 @@ class Labeler:
             return self._merged(own.posteriors, n_groups)[own.part]
 
         return on_faces
+
+    def _smooth(self, poses: Sequence[Workpiece], n_groups: int) -> Callable[[Workpiece], FloatArray]:
+        """Function that gives the (n', n_groups) smoothed posteriors of groups at the vertices of one of the poses."""
+        return smooth_means(poses, lambda pose: self._kept(pose, n_groups), self.length)
 
     def _own_parts(self, poses: Sequence[Workpiece], progress: Progress) -> OwnParts:
         """Parts of a mesh, in some poses, that is cut by its own shape."""
@@ -317,6 +325,11 @@ class Labeler:
 def _pose_signatures(poses: Sequence[Workpiece]) -> list[PoseSignature]:
     """The described poses without their intermediate results."""
     return [workpiece.pose for workpiece in poses]
+
+
+def _spread_over(poses: Sequence[Workpiece], most: int) -> list[int]:
+    """Numbers of at most so many of the poses: the first, the last, and some between."""
+    return sorted(set(np.linspace(0, len(poses) - 1, most).round().astype(int).tolist()))
 
 
 def _steps(poses: Sequence[Workpiece], progress: Progress) -> list[tuple[Sequence[Workpiece], Progress]]:

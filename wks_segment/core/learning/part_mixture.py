@@ -299,7 +299,8 @@ def _mean_posteriors(
     def posteriors(pose: Workpiece) -> FloatArray:
         return mixture.group_posteriors(standardizer.transform(pose.signature), kind, n_kinds)
 
-    return smooth_means(poses, posteriors, SMOOTHING_LENGTH)
+    smooth = smooth_means(poses, posteriors, SMOOTHING_LENGTH)
+    return np.mean([pose.surface.to_faces(smooth(pose)) for pose in poses], axis=0)
 
 
 def _with_vanished_first(kinds: Kinds, found: FloatArray, left: FloatArray) -> Kinds:

@@ -15,7 +15,6 @@ from ..mesh.adjacency import FaceAdjacency
 from ..mesh.canonical import spread
 from ..mesh.surface import Surface
 from ..mesh.triangle_mesh import FloatArray, TriangleMesh
-from ..progress import Progress
 from .pose_signature import PoseSignature
 
 Result = TypeVar("Result")
@@ -126,29 +125,36 @@ class Workpiece:
         """(p,) curvature across the border of each pair of `neighbors`."""
         return curvature_across(self.surface, self.normals.over(COARSE), self.neighbors)
 
-    def smooth_on_faces(self, values: FloatArray, length: float) -> FloatArray:
-        """(m, k) values of the original faces, averaged over the surface within about a length."""
-        # What a hole takes up is seen by how much of a constant it takes up.
-        constant = np.ones((len(values), 1), dtype=values.dtype)
-        at_vertices = self.surface.from_faces(np.concatenate([values, constant], axis=1))
-        smooth = self.surface.to_faces(self.flows.over(length).smooth(at_vertices))
-        return smooth[:, :-1] / smooth[:, -1:]
-
 
 AnyPose = TriangleMesh | PoseSignature | Workpiece
 """A pose as methods of a model accept it: the later in this list, the less is left to compute."""
 
 
 def smooth_means(
-    poses: Sequence[Workpiece],
-    at_vertices: Callable[[Workpiece], FloatArray],
-    length: float,
-    progress: Progress | None = None,
-) -> FloatArray:
-    """(m, k) mean over the poses of one mesh of values at their vertices, averaged over the surface within a length.
+    poses: Sequence[Workpiece], at_vertices: Callable[[Workpiece], FloatArray], length: float
+) -> Callable[[Workpiece], FloatArray]:
+    """Function that gives values at the vertices of one of the poses of a mesh, smoothed within about a length.
 
-    Averaging over the surface is about the same in every pose: it is done once, where limbs are stretched out most.
+    Poses whose surfaces have the same triangles share the mean of their values: it is smoothed once, where limbs are
+    stretched out most, since smoothing does about the same in every pose. Otherwise, as after refinement, each pose has
+    its own values.
+
+    Parameters
+    ----------
+    poses
+    at_vertices
+        Gives (n', k) values at the vertices of a pose.
+    length : float
+        In units of the square root of the area; 0: no smoothing.
     """
+
+    def smooth(pose: Workpiece, values: FloatArray) -> FloatArray:
+        return pose.flows.over(length).smooth(values) if length > 0 else values
+
+    triangles = poses[0].surface.mesh.faces
+    if len(poses) == 1 or any(not np.array_equal(pose.surface.mesh.faces, triangles) for pose in poses):
+        return lambda pose: smooth(pose, at_vertices(pose))
+    total = sum(at_vertices(pose) for pose in poses)
     stretched = max(poses, key=lambda pose: spread(pose.surface.original))
-    values = [pose.surface.to_faces(at_vertices(pose)) for pose, _ in Progress.of(progress).each(list(poses))]
-    return stretched.smooth_on_faces(np.mean(values, axis=0), length)
+    common = smooth(stretched, np.asarray(total / len(poses)))
+    return lambda pose: common
