@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.sparse
 
 from ..core.mesh.triangle_mesh import FloatArray, IntArray
 from ..core.message import Message
@@ -53,11 +52,11 @@ class Skin:
 
     def bone_of_faces(self) -> IntArray:
         """(m,) bone with most weight on the corners of each face; −1 where no bone has weight."""
+        from scipy.sparse import csr_matrix  # Blender imports this module when it starts
+
         vertex, face = self.corners
-        weights = scipy.sparse.csr_matrix(self.weights)
-        of_corners = scipy.sparse.csr_matrix(
-            (np.ones(len(vertex)), (face, vertex)), shape=(len(self.areas), len(self.vertices))
-        )
+        weights = csr_matrix(self.weights)
+        of_corners = csr_matrix((np.ones(len(vertex)), (face, vertex)), shape=(len(self.areas), len(self.vertices)))
         sums = (of_corners @ weights).tocsr()
         if not sums.shape[1]:
             return np.full(len(self.areas), -1)
@@ -67,6 +66,8 @@ class Skin:
 
     def borders(self, of_faces: IntArray, count: int) -> FloatArray:
         """(count, count) number of places where faces of two numbers, from `of_faces`, meet."""
+        from scipy.sparse import csr_matrix
+
         vertex, face = self.corners
         size = float(np.ptp(self.vertices, axis=0).max()) if len(self.vertices) else 0.0
         cells = np.round(self.vertices / (SAME_POINT_SHARE * size or 1.0)).astype(np.int64)
@@ -74,6 +75,6 @@ class Skin:
         number = of_faces[face]
         used = number >= 0
         shape = int(place.max(initial=-1)) + 1, count
-        meets = scipy.sparse.csr_matrix((np.ones(int(used.sum())), (place[vertex[used]], number[used])), shape=shape)
+        meets = csr_matrix((np.ones(int(used.sum())), (place[vertex[used]], number[used])), shape=shape)
         meets.data[:] = 1.0
         return np.asarray((meets.T @ meets).toarray())

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import bpy
 import numpy as np
-import scipy.sparse
 
 from ...core.message import message_of
 from ...rigs import BoneTree, Skeleton, Skin
@@ -12,6 +13,9 @@ from ..errors import UserError
 from .attributes import read_floats
 from .characters import Character, armature_of, vertex_ranges
 from .mesh_arrays import Body
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 
 def bone_tree_of(character: Character) -> BoneTree:
@@ -41,7 +45,7 @@ def bone_tree_of(character: Character) -> BoneTree:
         raise UserError('"{name}": {reason}', name=character.name, reason=message_of(error)) from error
 
 
-def _weights(character: Character, skeleton: Skeleton) -> scipy.sparse.csr_matrix:
+def _weights(character: Character, skeleton: Skeleton) -> csr_matrix:
     """(n, bones) weights of the bones that deform a character; an object that is parented to a bone has all of its."""
     index = {bone: i for i, bone in enumerate(skeleton.bones)}
     vertices: list[int] = []
@@ -65,7 +69,9 @@ def _weights(character: Character, skeleton: Skeleton) -> scipy.sparse.csr_matri
             vertices += range(inside.start, inside.stop)
             bones += [index[carrier]] * (inside.stop - inside.start)
             weights += [1.0] * (inside.stop - inside.start)
-    return scipy.sparse.csr_matrix((weights, (vertices, bones)), shape=(n_vertices, len(skeleton.bones)))
+    from scipy.sparse import csr_matrix  # enabling the extension imports no SciPy
+
+    return csr_matrix((weights, (vertices, bones)), shape=(n_vertices, len(skeleton.bones)))
 
 
 def _carrying_bone(obj: bpy.types.Object) -> str:

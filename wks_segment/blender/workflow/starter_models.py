@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import bpy
 
-from ...core import Cache, MemoryCache
+from ... import core
 from ...core.message import Message
 from ...core.progress import Progress
 from ..errors import UserError
@@ -41,7 +41,7 @@ class StarterJob(SegmentationJob):
     chosen: NamedModel | None = None
 
     @classmethod
-    def reading(cls, context: bpy.types.Context, cache: Cache) -> StarterJob:
+    def reading(cls, context: bpy.types.Context, cache: core.Cache) -> StarterJob:
         """Read the selected objects and the starter models; UserError if they cannot be used."""
         starters = [
             NamedModel(name, model_library.loaded(path), path) for name, path in model_library.starters().items()
@@ -61,7 +61,7 @@ class StarterJob(SegmentationJob):
         """
         if self.chosen is None:
             # Signatures that are computed for the ranking serve to label as well.
-            self.cache = self.cache or MemoryCache()
+            self.cache = self.cache or core.MemoryCache()
             run = Run(self.report, progress.part(0.0, RANKED_SHARE), self.cache)
             ranking = rank_poses(self.starters, self.poses, run)
             self.chosen = self.starters[ranking.best.index]
