@@ -16,7 +16,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "wks_segment"
 BLENDERS_OWN = {"bpy", "bmesh", "mathutils", "bpy_extras", "gpu", "blf", "aud"}
 LAYERS = {
     "core": [
-        {"files"},
+        {"files", "user_labels"},
         {"mesh"},
         {"uv"},
         {"spectral"},
@@ -25,7 +25,6 @@ LAYERS = {
         {"parts"},
         {"learning"},
         {"labeling"},
-        {"user_labels"},
         {"model_file"},
         {"segmentation"},
         {"draft", "ranking"},

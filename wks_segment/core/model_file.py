@@ -23,6 +23,7 @@ from .files.checked_json import (
     quoted,
     read_array,
 )
+from .files.model_arrays import check_groups, check_joins, check_means, check_variances
 from .files.whole_file import write_whole
 from .labeling.region_atlas import RegionAtlas
 from .labeling.traits import FIELDS, PLANES, SURROUNDINGS
@@ -31,8 +32,7 @@ from .learning.merge_tree import MOST_SEGMENTS, MergeTree
 from .learning.parameters import PARAMETERS, check_parameters, effective
 from .learning.part_mixture import PartMixture
 from .learning.standardizer import LEAST_SPREAD, Standardizer
-from .learning.taught_parts import MOST_PARTS as MOST_TAUGHT
-from .learning.taught_parts import TaughtParts
+from .learning.taught_parts import MOST_TAUGHT_PARTS, TaughtParts
 from .mesh.triangle_mesh import FloatArray, IntArray
 from .message import Message, message_of
 from .parts.kind_traits import KindTraits
@@ -54,8 +54,6 @@ MOST_OF_PARAMETER = {"n_segments": 1000, "n_eigenpairs": 5000, "n_energies": 100
 """Upper bounds of parameters in a file: with more, a mesh would be refined until the memory is full."""
 MOST_SEED = 2**32
 """Upper bound of other parameters, of which the seed is the largest."""
-FARTHEST_MEAN = 2.0
-"""How far a mean may be, in units of the largest distance that is possible; fits reach 0.6 of it."""
 ADJUSTABLE = ("n_segments", "smoothness")
 """Parameters that are changed after a model was learned."""
 WHOLE_SHARE = 1.001
@@ -163,13 +161,13 @@ def _decoded(content: dict[str, Any]) -> ModelContent:
     }
     n_components = len(arrays["weights"])
     if grouped:
-        _check_joins(arrays["joins"], n_components)
+        check_joins(arrays["joins"], n_components)
         for kind in REGION_KINDS:
-            _check_groups(arrays, kind, n_components)
-    _check_variances(arrays["covariances"], covariance_type)
+            check_groups(arrays, kind, n_components)
+    check_variances(arrays["covariances"], covariance_type, LEAST_SPREAD**2)
     if abs(arrays["weights"].sum() - 1) > 1e-6:
         raise DamagedError("the weights do not sum to 1")
-    _check_means(arrays, parameters)
+    check_means(arrays, parameters)
     try:
         check_parameters(parameters)
     except (ValueError, TypeError) as error:
@@ -258,8 +256,8 @@ def _fields(
                 Field("kind_touching", (n_kinds, n_kinds), least=POSITIVE, most=BELOW_ONE),
             )
     if content["version"] == TAUGHT_VERSION:
-        g = length(content, "taught_left", MOST_TAUGHT)
-        yield from (Field(f"taught_{side}", (g,), 0, MOST_TAUGHT - 1, whole=True) for side in ("left", "right"))
+        g = length(content, "taught_left", MOST_TAUGHT_PARTS)
+        yield from (Field(f"taught_{side}", (g,), 0, MOST_TAUGHT_PARTS - 1, whole=True) for side in ("left", "right"))
         yield Field("taught_of_bodies", (), 0, 1, whole=True)
     for kind in REGION_KINDS:
         r = length(content, f"{kind}_segment", MOST_REGIONS)
@@ -320,46 +318,6 @@ def _n_components(content: dict[str, Any], n_segments: Any) -> int:
             Message("{segments} segments of {count} components", segments=quoted(n_segments), count=count)
         )
     return count
-
-
-def _check_joins(joins: FloatArray, n_components: int) -> None:
-    """Each join must be of two different groups that exist at this step; the joined group has the name of the first."""
-    groups = set(range(n_components))
-    for i, j in joins.tolist():
-        if not (i in groups and j in groups and i != j):
-            raise DamagedError(Message("joins has the pair {i:g}, {j:g}, which cannot be joined", i=i, j=j))
-        groups.remove(j)
-
-
-def _check_groups(arrays: dict[str, FloatArray], kind: str, n_components: int) -> None:
-    """Each region must belong to one of the groups of its atlas."""
-    groups, segment = float(arrays[f"{kind}_groups"]), arrays[f"{kind}_segment"]
-    if (segment >= groups).any():
-        raise DamagedError(
-            Message("{name} has a number that is none of {groups:g} groups", name=f"{kind}_segment", groups=groups)
-        )
-
-
-def _check_variances(covariances: FloatArray, covariance_type: CovarianceType) -> None:
-    """Variances must not be too small, and matrices must be positive definite."""
-    matrices = covariance_type in ("tied", "full")
-    variances = np.diagonal(covariances, axis1=-2, axis2=-1) if matrices else covariances
-    if variances.min() < LEAST_SPREAD**2:
-        raise DamagedError("a variance is not positive, or far too small")
-    if matrices and not (np.linalg.eigvalsh(covariances) > 0).all():
-        raise DamagedError("a covariance matrix is not positive definite")
-
-
-def _check_means(arrays: dict[str, FloatArray], parameters: dict[str, Any]) -> None:
-    """No component may be farther away than its share of the standardized samples allows.
-
-    Their mean is 0, and their variance 1, so that a component of weight w lies within 1 / √w. The paper's samples are
-    signatures, which are not negative: a component lies within 1 / w of their mean.
-    """
-    weights = arrays["weights"][:, None]
-    farthest = np.abs(arrays["centre"]) / weights if parameters["preset"] == "paper" else 1 / np.sqrt(weights)
-    if (np.abs(arrays["means"]) > FARTHEST_MEAN * farthest).any():
-        raise DamagedError("means has a number that is far too large for its weight")
 
 
 def _digest(parameters: dict[str, Any], covariance_type: str, arrays: Mapping[str, FloatArray | IntArray]) -> str:

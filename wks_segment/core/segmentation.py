@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from copy import copy
-from dataclasses import replace
 from functools import partial
 from os import PathLike
 from typing import Any, Literal
 
 from . import model_file
 from .labeling.pose_labeling import PoseLabeling
+from .labeling.recognized_parts import recognized_parts
 from .labeling.region_atlas import RegionAtlas
 from .labeling.taught_labels import learned_lesson, lesson_of
 from .learning.gaussian_mixture import CovarianceType
@@ -28,7 +28,7 @@ from .mesh.surface import IslandMode
 from .mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
 from .message import Message
 from .poses.arguments import as_list
-from .poses.pose_cache import AnyPose, Workpiece
+from .poses.pose_cache import AnyPose
 from .poses.signature_cache import Cache
 from .progress import Progress, ReportFunction
 from .spectral.eigenpairs import Accuracy
@@ -40,11 +40,6 @@ from .user_labels import PartNotes, Unlabeled
 GROUPED, RECOGNIZED = 0.63, 0.9
 """Shares of the time of learning from described poses after which the parts are found and merged, and their regions
 are known: means of ten characters."""
-FIRST_ROUND = 0.7
-"""Share of the time that is left for regions after which a round of finding them ends; mostly there is one."""
-
-MERGING_ROUNDS = 6
-"""Most times that regions are found, each time without a segment that was found nowhere."""
 
 
 class PoseSegmentation(PoseLabeling, Estimator):
@@ -212,17 +207,16 @@ class PoseSegmentation(PoseLabeling, Estimator):
         overall = overall.part(described, 1.0)
         overall(0.0, "parts")
         training = TrainingSamples.of(poses, parameters)
+        labeler_of = partial(self._labeler_of, standardizer=training.standardizer)
         atlases = None
         if lesson is not None:
             learn = partial(learn_taught_parts, parameters, poses, training=training, rest=rest, cache=cache)
-            labeler_of = partial(self._labeler_of, standardizer=training.standardizer)
             learned, atlases = learned_lesson(lesson, learn, labeler_of, poses, rest, overall.part(0.0, RECOGNIZED))
         else:
             learned = learn_parts(parameters, poses, training, rest, cache, overall.part(0.0, GROUPED))
-        if lesson is None and learned.grouping is not None:
-            learned, atlases = self._recognized(
-                learned, training.standardizer, poses, rest, overall.part(GROUPED, RECOGNIZED)
-            )
+            if learned.grouping is not None:
+                step = overall.part(GROUPED, RECOGNIZED)
+                learned, atlases = recognized_parts(labeler_of, learned, poses, rest, step)
         self._set_learned(learned, training.standardizer, atlases, usual_scores(learned, training))
         self.part_notes_ = PartNotes()
         overall(1.0, "done")
@@ -376,29 +370,6 @@ class PoseSegmentation(PoseLabeling, Estimator):
         self.grouping_, self.kind_traits_, self.taught_ = learned.grouping, learned.traits, learned.taught
         self.regions_, self.sides_ = atlases or (None, None)
         self.usual_scores_ = scores
-
-    def _recognized(
-        self,
-        learned: PartMixture,
-        standardizer: Standardizer,
-        poses: Sequence[Workpiece],
-        rest: TriangleMesh | None,
-        progress: Progress,
-    ) -> tuple[PartMixture, tuple[RegionAtlas, RegionAtlas]]:
-        """Atlases of the regions of the learned poses, and the merge tree without segments that are found nowhere.
-
-        A small kind of part may be lost when borders are smoothed: then it is merged, and another part split.
-        """
-        assert learned.grouping is not None
-        for round_ in range(MERGING_ROUNDS):
-            labeler = self._labeler_of(learned, standardizer)
-            atlases = labeler.atlases(poses, rest, progress.part(0.0, FIRST_ROUND, "regions"))
-            progress = progress.part(FIRST_ROUND, 1.0)
-            lost = sorted(set(range(labeler.n_segments)) - set(atlases[1].traits.segment.tolist()))
-            if not lost or learned.traits is not None or round_ == MERGING_ROUNDS - 1:
-                break  # the tree that is returned is the one that the atlases are of
-            learned = replace(learned, grouping=learned.grouping.without(lost[-1], labeler.n_segments))
-        return learned, atlases
 
     def _check_parameters(self) -> None:
         check_parameters(self.get_params())

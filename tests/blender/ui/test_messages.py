@@ -12,6 +12,7 @@ from message_templates import SOURCES, all_calls, fields, name_of, sentences_mad
 
 from wks_segment.blender.operators import _report
 from wks_segment.blender.ui import messages, models_panel
+from wks_segment.blender.ui.german.file_texts import GERMAN_FILE_MESSAGES
 from wks_segment.blender.ui.german.interface_texts import GERMAN_OPERATORS
 from wks_segment.blender.ui.german.message_texts import GERMAN_MESSAGES
 from wks_segment.blender.ui.german.part_names import GERMAN_NAMES
@@ -19,7 +20,8 @@ from wks_segment.blender.ui.segments_panel import NAME_PRESETS
 from wks_segment.blender.ui.translations import MESSAGE, NAME, TRANSLATIONS
 from wks_segment.core.message import Message
 
-KNOWN = GERMAN_OPERATORS | GERMAN_MESSAGES
+MESSAGES = GERMAN_MESSAGES | GERMAN_FILE_MESSAGES
+KNOWN = GERMAN_OPERATORS | MESSAGES
 TEMPLATES = templates()
 NUMBERS = "bcdoxXneEfFgG%,"
 """Last letters of format specifications that take a number."""
@@ -71,12 +73,12 @@ def test_messages_are_found():
 
 
 def test_no_text_is_of_a_message_that_is_gone():
-    assert GERMAN_MESSAGES.keys() - TEMPLATES.keys() == set()
+    assert MESSAGES.keys() - TEMPLATES.keys() == set()
 
 
-@pytest.mark.parametrize("english", GERMAN_MESSAGES)
+@pytest.mark.parametrize("english", MESSAGES)
 def test_text_says_the_same(english):
-    german = GERMAN_MESSAGES[english]
+    german = MESSAGES[english]
     assert written_fields(german) == written_fields(english)
     assert "" not in fields(english), "fields have names"
     assert not german.endswith(".")

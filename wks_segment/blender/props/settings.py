@@ -253,11 +253,9 @@ class WKSSegmentSettings(TeachSettings, bpy.types.PropertyGroup):
         default=True, update=_outputs_changed,
     )  # fmt: skip
     write_ucupaint: BoolProperty(
-        name="Ucupaint",
-        description="Write the color attribute that the Color ID masks of the add-on Ucupaint read",
-        default=False,
-        update=_outputs_changed,
-    )
+        name="Ucupaint", description="Write the color attribute that the Color ID masks of the add-on Ucupaint read",
+        default=False, update=_outputs_changed,
+    )  # fmt: skip
     write_materials: BoolProperty(
         name="Materials",
         description="Add a material slot for each segment. Clear restores the object's own materials",

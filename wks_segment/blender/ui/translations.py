@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from .german.file_texts import GERMAN_FILE_MESSAGES
 from .german.interface_texts import GERMAN_INTERFACE, GERMAN_OPERATORS
 from .german.message_texts import GERMAN_MESSAGES
 from .german.part_names import GERMAN_NAMES
@@ -18,7 +19,7 @@ NAME = "WKS Segment name"
 TRANSLATIONS = {
     "de_DE": {("*", text): german for text, german in GERMAN_INTERFACE.items()}
     | {(OPERATOR, text): german for text, german in GERMAN_OPERATORS.items()}
-    | {(MESSAGE, text): german for text, german in (GERMAN_OPERATORS | GERMAN_MESSAGES).items()}
+    | {(MESSAGE, text): german for text, german in (GERMAN_OPERATORS | GERMAN_MESSAGES | GERMAN_FILE_MESSAGES).items()}
     | {(NAME, text): german for text, german in GERMAN_NAMES.items()}
 }
 """By language: text by context and English text."""

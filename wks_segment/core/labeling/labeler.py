@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -26,9 +27,9 @@ from .learned_areas import with_learned_areas
 from .own_parts import OwnParts, own_parts
 from .polygons import Cleaning, PolygonMesh
 from .region_atlas import RegionAtlas
-from .sides import have_counterpart, side_field, sides_of_regions
+from .sides import have_counterpart, side_field, sides_in_pose
 from .taught_sides import halves
-from .traits import FIELDS, Regions, Traits, mean_traits
+from .traits import Regions, Traits, fields_of, mean_traits
 
 LABELS_SHARE = 0.7
 """Share of the time of finding regions that their labels take; the rest is recognizing the regions."""
@@ -195,7 +196,7 @@ class Labeler:
     ) -> IntArray:
         """(p,) side of each polygon, given the segments; see `PoseSegmentation.polygon_sides`."""
         votes = [
-            _sides_in_pose(poses[i], field, polygons[i], labels)
+            sides_in_pose(poses[i], field, polygons[i], labels, MIN_SHARE)
             for i, field in self._fields_of_sides(atlas, poses, progress)
         ]
         # A tie between left and neither is neither.
@@ -217,7 +218,8 @@ class Labeler:
                 side = np.where(have_counterpart(found.area, side, found.segment), side, 0)
             side_of_face = np.append(side, 0)[np.minimum(regions.region, len(side))]
             for pose, _ in step.part(LABELS_SHARE, 1.0).each(together):
-                yield voters[done], _side_field(pose, regions, atlas, side_of_face)
+                key, field = ResultKey(Kind.SIDE_FIELD), partial(side_field, pose, side_of_face)
+                yield voters[done], pose.results.get(key, (regions, atlas), field)
                 done += 1
 
     def _atlas(
@@ -369,18 +371,14 @@ class Labeler:
 
     def _traits(self, regions: Regions, pose: Workpiece, n_poses: int) -> Traits:
         """Traits, in one pose, of regions that were found in `n_poses` poses together."""
-        fields = pose.results.get(ResultKey(Kind.FIELDS), (self.mixture,), lambda: self._fields(pose))
+        means, weights = self.mixture.means, self.mixture.weights
+        fields = pose.results.get(
+            ResultKey(Kind.FIELDS),
+            (self.mixture,),
+            lambda: fields_of(means, weights, self.standardizer.transform(pose.signature)),
+        )
         key = ResultKey(Kind.TRAITS, n_poses)
         return pose.results.get(key, (regions, fields), lambda: regions.traits(pose, fields))
-
-    def _fields(self, pose: Workpiece) -> FloatArray:
-        """(n', FIELDS) signature along the axes on which the components lie farthest apart."""
-        means, weights = self.mixture.means, self.mixture.weights
-        axes = np.linalg.eigh((means * weights[:, None]).T @ means)[1][:, ::-1][:, :FIELDS]
-        # The library chooses the signs of the axes; a model must mean the same on every machine.
-        axes *= np.sign(axes[np.abs(axes).argmax(axis=0), np.arange(axes.shape[1])])
-        fields = self.standardizer.transform(pose.signature) @ axes
-        return np.pad(fields, ((0, 0), (0, FIELDS - axes.shape[1])))
 
 
 def _pose_signatures(poses: Sequence[Workpiece]) -> list[PoseSignature]:
@@ -398,18 +396,3 @@ def _steps(poses: Sequence[Workpiece], progress: Progress) -> list[tuple[Sequenc
     if of_one_mesh(_pose_signatures(poses)):
         return [(poses, progress)]
     return [([pose], progress.part(i / len(poses), (i + 1) / len(poses))) for i, pose in enumerate(poses)]
-
-
-def _side_field(pose: Workpiece, regions: Regions, atlas: RegionAtlas, side: IntArray) -> FloatArray:
-    """(m,) how far left or right each face of a pose is, given the side of the region of each face."""
-    return pose.results.get(ResultKey(Kind.SIDE_FIELD), (regions, atlas), lambda: side_field(pose, side))
-
-
-def _sides_in_pose(pose: Workpiece, field: FloatArray, polygon_of: IntArray, labels: IntArray) -> IntArray:
-    """(p,) side of each polygon in one pose."""
-    neighbors = pose.results.get(
-        ResultKey(Kind.POLYGON_NEIGHBORS, polygons=True),
-        (polygon_of,),
-        lambda: pose.neighbors.between_polygons(polygon_of),
-    )
-    return sides_of_regions(pose.surface, field, polygon_of, labels, MIN_SHARE, neighbors)

@@ -14,7 +14,7 @@ from scipy.spatial.distance import cdist
 from ..mesh.adjacency import FaceAdjacency, connected_regions
 from ..mesh.surface import Surface, shares_at_vertices
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
-from ..poses.pose_cache import Workpiece
+from ..poses.pose_cache import Kind, ResultKey, Workpiece
 from .traits import LEAST_OVERLAP
 
 SIMILAR_AREA = 0.5
@@ -72,6 +72,18 @@ def side_field(pose: Workpiece, side: IntArray) -> FloatArray:
     inside = shares_at_vertices(pose.surface, side % 3, 3)[:, 1:]
     left, right = np.maximum(pose.flows.over(SIDE_SURROUNDINGS).smooth(inside), 0).T
     return pose.surface.to_faces(((left - right) / np.maximum(left + right, LEAST_OVERLAP))[:, None])[:, 0]
+
+
+def sides_in_pose(
+    pose: Workpiece, field: FloatArray, polygon_of: IntArray, labels: IntArray, min_share: float
+) -> IntArray:
+    """(p,) side of each polygon in one pose; see `sides_of_regions`."""
+    neighbors = pose.results.get(
+        ResultKey(Kind.POLYGON_NEIGHBORS, polygons=True),
+        (polygon_of,),
+        lambda: pose.neighbors.between_polygons(polygon_of),
+    )
+    return sides_of_regions(pose.surface, field, polygon_of, labels, min_share, neighbors)
 
 
 def sides_of_regions(

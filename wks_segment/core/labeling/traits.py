@@ -145,6 +145,18 @@ class Traits:
         return cls(segment, np.maximum(area, LEAST_OVERLAP), signature, handedness, np.maximum(distance, 0))
 
 
+def fields_of(means: FloatArray, weights: FloatArray, samples: FloatArray) -> FloatArray:
+    """(n, FIELDS) samples along the axes on which the components of a mixture lie farthest apart.
+
+    Given the (K, d) means and (K,) weights of the components, and (n, d) samples.
+    """
+    axes = np.linalg.eigh((means * weights[:, None]).T @ means)[1][:, ::-1][:, :FIELDS]
+    # The library chooses the signs of the axes; a model must mean the same on every machine.
+    axes *= np.sign(axes[np.abs(axes).argmax(axis=0), np.arange(axes.shape[1])])
+    fields = samples @ axes
+    return np.pad(fields, ((0, 0), (0, FIELDS - axes.shape[1])))
+
+
 def mean_traits(poses: Sequence[Traits]) -> Traits:
     """Mean over poses that have the same regions in the same order."""
     return mean_of_numbered(poses[0], poses, [np.arange(len(poses[0].segment))] * len(poses))

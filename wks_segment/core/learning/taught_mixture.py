@@ -23,7 +23,7 @@ from .part_mixture import PartMixture, fitted_inside, kinds_of, principal_axes
 from .taught_parts import TaughtLabels, TaughtParts, alike_parts, with_like_neighbors
 from .training_samples import TrainingSamples
 
-COMPONENTS_OF_MESH, COMPONENTS_OF_BODIES = 40, 6
+TAUGHT_COMPONENTS_OF_MESH, TAUGHT_COMPONENTS_OF_BODIES = 40, 6
 """Number of components for each taught part, from poses of one mesh and from several meshes: with more, other bodies
 are recognized worse (docs/dev/experiments.md)."""
 STRETCH = 0.025
@@ -85,7 +85,7 @@ def learn_taught_parts(
     progress.part(0.5, 1.0, "mixture")(0.0)
     asked = effective(parameters, "covariance_type")
     covariance_type: CovarianceType = ("tied" if alone else "diag") if asked == "auto" else asked
-    per_part = COMPONENTS_OF_MESH if alone else COMPONENTS_OF_BODIES
+    per_part = TAUGHT_COMPONENTS_OF_MESH if alone else TAUGHT_COMPONENTS_OF_BODIES
     chosen = training.only(group >= 0)
     mixture, group_of = fitted_inside(
         chosen, group[group >= 0], axes, per_part * len(np.unique(group[group >= 0])), covariance_type
