@@ -57,7 +57,7 @@ def oriented(taught: TaughtParts, labels: IntArray, mesh: TriangleMesh, touching
 
 def _clearness(straight: float, across: float) -> float:
     """How clearly two pairs lie on the same sides, or on opposite ones; 0 to 1."""
-    return abs(straight - across) / max(straight + across, np.finfo(float).tiny)
+    return abs(straight - across) / (straight + across + float(np.finfo(float).tiny))
 
 
 def _sums(table: FloatArray, left: IntArray, right: IntArray, g: int, h: int) -> tuple[float, float]:
