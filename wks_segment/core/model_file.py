@@ -32,7 +32,7 @@ from .learning.merge_tree import MOST_SEGMENTS, MergeTree
 from .learning.parameters import PARAMETERS, check_parameters, effective
 from .learning.part_mixture import PartMixture
 from .learning.standardizer import LEAST_SPREAD, Standardizer
-from .learning.taught_parts import MOST_TAUGHT_PARTS, TaughtParts
+from .learning.taught_parts import MOST_TAUGHT, TaughtParts
 from .mesh.triangle_mesh import FloatArray, IntArray
 from .message import Message, message_of
 from .parts.kind_traits import KindTraits
@@ -256,8 +256,8 @@ def _fields(
                 Field("kind_touching", (n_kinds, n_kinds), least=POSITIVE, most=BELOW_ONE),
             )
     if content["version"] == TAUGHT_VERSION:
-        g = length(content, "taught_left", MOST_TAUGHT_PARTS)
-        yield from (Field(f"taught_{side}", (g,), 0, MOST_TAUGHT_PARTS - 1, whole=True) for side in ("left", "right"))
+        g = length(content, "taught_left", MOST_TAUGHT)
+        yield from (Field(f"taught_{side}", (g,), 0, MOST_TAUGHT - 1, whole=True) for side in ("left", "right"))
         yield Field("taught_of_bodies", (), 0, 1, whole=True)
     for kind in REGION_KINDS:
         r = length(content, f"{kind}_segment", MOST_REGIONS)
