@@ -38,9 +38,9 @@ STARTER_FOLDER = Path(__file__).parents[2] / "models"
 """Folder of the models that come with the extension. They are only read: applying one adds a copy to the scene."""
 STARTER_SPREADS = {"human": 0.42}
 """Spread of the usual scores of a model by its file. *Human* was learned from a few made-up bodies, and real ones
-differ more: Princeton humans score up to 1.1 below the learned bodies, other classes 1.9 and more. With this spread, what
-scores 1.8 below does not fit any more. *Quadruped* was learned from animals of artists, so its usual scores are those of
-other bodies already."""
+differ more: Princeton humans score up to 1.1 below the learned bodies, other classes 1.9 and more. With this spread,
+what scores 1.8 below does not fit any more. *Quadruped* was learned from animals of artists, so its usual scores are
+those of other bodies already."""
 ROW_STORES = {
     "model": "model",
     "summary": "model_summary",
