@@ -148,7 +148,7 @@ def test_a_fit_without_labels_knows_no_taught_parts(described):
     ("labels", "message"),
     [
         ([PARTS], "2 meshes, but labels for 1"),
-        ([PARTS, PARTS[:-1]], r"mesh 2 has \d+ faces, but labels of shape"),
+        ([PARTS, PARTS[:-1]], r"mesh 2 has [\d,]+ faces, but labels of shape"),
         ([None, None], "say no part"),
         ([np.where(PARTS == LONG, 9, PARTS), None], "no face has part 1"),
         ([np.where(np.arange(len(PARTS)) < 2, 5, PARTS), None], "part 5 has 2 faces"),

@@ -31,8 +31,7 @@ from .learning.merge_tree import MOST_SEGMENTS, MergeTree
 from .learning.parameters import PARAMETERS, check_parameters, effective
 from .learning.part_mixture import PartMixture
 from .learning.standardizer import LEAST_SPREAD, Standardizer
-from .learning.taught_parts import MOST_PARTS as MOST_TAUGHT
-from .learning.taught_parts import TaughtParts
+from .learning.taught_parts import MOST_TAUGHT, TaughtParts
 from .mesh.triangle_mesh import FloatArray, IntArray
 from .message import Message, message_of
 from .parts.kind_traits import KindTraits

@@ -52,9 +52,9 @@ def learned_bodies():
         of_components.append(kind)
         return mixture, kind
 
-    fitted = part_mixture._fitted_inside
+    fitted = part_mixture.fitted_inside
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(part_mixture, "_fitted_inside", recorded)
+        patch.setattr(part_mixture, "fitted_inside", recorded)
         model = PoseSegmentation(**SMALL).fit(BODIES, cache=cache)
     (kind,) = of_components
     return model, cache.kinds, kind
@@ -161,7 +161,7 @@ def samples():
 @pytest.mark.parametrize("covariance_type", ["tied", "shared", "diag", "spherical"])
 def test_each_component_has_samples_of_one_kind(samples, covariance_type):
     points, shares, kind = samples
-    mixture, of_components = part_mixture._fitted_inside(training(points, shares), kind, np.eye(3), 28, covariance_type)
+    mixture, of_components = part_mixture.fitted_inside(training(points, shares), kind, np.eye(3), 28, covariance_type)
     assert set(of_components) == {0, 2, 3}
     # By the square root of the area: 25.3, 12.6 and 6.3 of 44.2.
     assert np.bincount(of_components).tolist() == [16, 0, 8, 4]
@@ -178,7 +178,7 @@ def test_each_component_has_samples_of_one_kind(samples, covariance_type):
 
 def test_full_matrices_have_one_component_for_each_kind(samples):
     points, shares, kind = samples
-    mixture, of_components = part_mixture._fitted_inside(training(points, shares), kind, np.eye(3), 28, "full")
+    mixture, of_components = part_mixture.fitted_inside(training(points, shares), kind, np.eye(3), 28, "full")
     assert of_components.tolist() == [0, 2, 3]
     for k, covariance in zip((0, 2, 3), mixture.covariances, strict=True):
         expected = np.cov(points[kind == k].T, aweights=shares[kind == k], ddof=0)
@@ -188,10 +188,8 @@ def test_full_matrices_have_one_component_for_each_kind(samples):
 def test_the_order_of_samples_does_not_matter(samples):
     points, shares, kind = samples
     order = np.random.default_rng(1).permutation(len(points))
-    first, kinds = part_mixture._fitted_inside(training(points, shares), kind, np.eye(3), 28, "tied")
-    again, kinds_again = part_mixture._fitted_inside(
-        training(points, shares, order), kind[order], np.eye(3), 28, "tied"
-    )
+    first, kinds = part_mixture.fitted_inside(training(points, shares), kind, np.eye(3), 28, "tied")
+    again, kinds_again = part_mixture.fitted_inside(training(points, shares, order), kind[order], np.eye(3), 28, "tied")
     np.testing.assert_array_equal(kinds_again, kinds)
     np.testing.assert_allclose(again.means, first.means, atol=1e-9)
     np.testing.assert_allclose(again.covariances, first.covariances, atol=1e-9)
@@ -213,7 +211,7 @@ def test_later_axes_count_more_than_their_variance():
     points = generator.standard_normal((4000, 30)) * np.sqrt(variances)
     points -= points.mean(axis=0)
     turn = np.linalg.qr(generator.standard_normal((30, 30)))[0]
-    projected = points @ turn @ part_mixture._principal_axes(training(points @ turn))
+    projected = points @ turn @ part_mixture.principal_axes(training(points @ turn))
     covariance = projected.T @ projected / 4000
     expected = np.linalg.eigvalsh(points.T @ points / 4000)[:-21:-1]
     np.testing.assert_allclose(covariance, np.diag(expected / np.sqrt(expected + 0.01)), atol=1e-9)

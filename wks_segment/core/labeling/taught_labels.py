@@ -10,6 +10,7 @@ import numpy as np
 
 from ..learning.parameters import Preset
 from ..learning.part_mixture import PartMixture
+from ..learning.taught_mixture import touching_parts
 from ..learning.taught_parts import TaughtLabels, TaughtParts, Unlabeled, UnlikePartsError, checked_labels
 from ..mesh.triangle_mesh import IntArray, TriangleMesh
 from ..message import Message
@@ -112,7 +113,8 @@ def recognized_taught_parts(
         [of_poses[first], *of_poses[:first], *of_poses[first + 1 :]] for of_poses in (poses, labels)
     )
     mesh = in_order[0].surface.original
-    taught = oriented(learned.taught, labels[first], mesh if at_rest is None else at_rest)
+    touching = touching_parts([poses[first]], [labels[first]], learned.taught.n_parts)
+    taught = oriented(learned.taught, labels[first], mesh if at_rest is None else at_rest, touching)
     labeler = replace(labeler, taught=taught)
     atlas = _atlas(labeler, in_order, labels_in_order, at_rest, taught, progress.part(0.0, 0.7))
     labeler = replace(labeler, sides_atlas=atlas)

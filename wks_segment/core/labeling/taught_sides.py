@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from ..learning.taught_parts import TaughtParts
 from ..mesh.adjacency import FaceAdjacency, connected_regions
@@ -15,11 +16,11 @@ UNKNOWN_SIDE = 2
 """Stands for the side of a region that shows neither a left nor a right part."""
 
 
-def oriented(taught: TaughtParts, labels: IntArray, mesh: TriangleMesh) -> TaughtParts:
+def oriented(taught: TaughtParts, labels: IntArray, mesh: TriangleMesh, touching: FloatArray) -> TaughtParts:
     """The taught parts with those parts of pairs as `left` that lie on the left, which is +x.
 
     In a bent pose a right hand may lie on the left. So only the pair that is farthest apart is oriented by its place,
-    and every other one by the nearest pair that is oriented already: a hand is nearest to the forearm of its own arm.
+    and then each time a pair by one that is oriented already: by which parts touch, if any do, else by which are near.
 
     Parameters
     ----------
@@ -28,6 +29,8 @@ def oriented(taught: TaughtParts, labels: IntArray, mesh: TriangleMesh) -> Taugh
         Taught part of each face, −1 for none. Pairs of which the mesh lacks a part stay as they are.
     mesh : TriangleMesh
         At rest if possible.
+    touching : (parts, parts) array
+        Length of the borders between parts on the mesh.
     """
     said = labels >= 0
     weights = mesh.face_areas[said] + np.finfo(float).tiny
@@ -39,9 +42,12 @@ def oriented(taught: TaughtParts, labels: IntArray, mesh: TriangleMesh) -> Taugh
     done: list[int] = []
     while open_groups:
         if done:
-            _, g, h = min((min(_distances(centers, left, right, g, h)), g, h) for g in open_groups for h in done)
-            straight, across = _distances(centers, left, right, g, h)
-            swap = across < straight
+            pairs = [(g, h) for g in open_groups for h in done]
+            borders = {pair: _sums(touching, left, right, *pair) for pair in pairs}
+            apart = {pair: _sums(cdist(centers, centers), left, right, *pair) for pair in pairs}
+            g, h = max(pairs, key=lambda pair: (_clearness(*borders[pair]), _clearness(*apart[pair])))
+            straight, across = borders[g, h]
+            swap = straight < across if straight != across else apart[g, h][1] < apart[g, h][0]
         else:
             g = max(open_groups, key=lambda one: abs(float(centers[left[one], 0] - centers[right[one], 0])))
             swap = bool(centers[left[g], 0] < centers[right[g], 0])
@@ -52,11 +58,15 @@ def oriented(taught: TaughtParts, labels: IntArray, mesh: TriangleMesh) -> Taugh
     return replace(taught, left=left, right=right)
 
 
-def _distances(centers: FloatArray, left: IntArray, right: IntArray, g: int, h: int) -> tuple[float, float]:
-    """Sum of the distances of two pairs on the same sides, and across."""
-    a, b, c, d = centers[left[g]], centers[right[g]], centers[left[h]], centers[right[h]]
-    straight = np.linalg.norm(a - c) + np.linalg.norm(b - d)
-    return float(straight), float(np.linalg.norm(a - d) + np.linalg.norm(b - c))
+def _clearness(straight: float, across: float) -> float:
+    """How clearly two pairs lie on the same sides, or on opposite ones; 0 to 1."""
+    return abs(straight - across) / max(straight + across, np.finfo(float).tiny)
+
+
+def _sums(table: FloatArray, left: IntArray, right: IntArray, g: int, h: int) -> tuple[float, float]:
+    """Sum of the values of two pairs of parts on the same sides, and across."""
+    straight = table[left[g], left[h]] + table[right[g], right[h]]
+    return float(straight), float(table[left[g], right[h]] + table[right[g], left[h]])
 
 
 def sides_by_labels(region: IntArray, count: int, taught: TaughtParts, labels: IntArray, areas: FloatArray) -> IntArray:

@@ -22,7 +22,7 @@ from .part_mixture import PartMixture, fitted_inside, kinds_of, principal_axes
 from .taught_parts import NOT_SAID, TaughtLabels, TaughtParts, alike_parts, with_like_neighbors
 from .training_samples import TrainingSamples
 
-COMPONENTS_OF_MESH, COMPONENTS_OF_BODIES = 40, 6
+TAUGHT_OF_MESH, TAUGHT_OF_BODIES = 40, 6
 """Number of components for each taught part, from poses of one mesh and from several meshes: with more, other bodies
 are recognized worse (docs/dev/experiments.md)."""
 STRETCH = 0.025
@@ -69,7 +69,7 @@ def learn_taught_parts(
     if not counts.all():
         raise ValueError(Message("part {part} is too small to be learned: mark more of it", part=int(counts.argmin())))
     pairs = alike_parts(training.standardized @ axes, part_of_samples, n_parts, lesson.apart)
-    pairs = with_like_neighbors(pairs, _touching(poses, lesson.of_faces, n_parts))
+    pairs = with_like_neighbors(pairs, touching_parts(poses, lesson.of_faces, n_parts))
     taught = TaughtParts.of(n_parts, pairs, not alone)
     said = part_of_samples >= 0
     group = np.where(said, taught.group_of_part[part_of_samples], NOT_SAID)
@@ -84,7 +84,7 @@ def learn_taught_parts(
     progress.part(0.5, 1.0, "mixture")(0.0)
     asked = effective(parameters, "covariance_type")
     covariance_type: CovarianceType = ("tied" if alone else "diag") if asked == "auto" else asked
-    per_part = COMPONENTS_OF_MESH if alone else COMPONENTS_OF_BODIES
+    per_part = TAUGHT_OF_MESH if alone else TAUGHT_OF_BODIES
     chosen = training.only(group >= 0)
     mixture, group_of = fitted_inside(
         chosen, group[group >= 0], axes, per_part * len(np.unique(group[group >= 0])), covariance_type
@@ -106,7 +106,7 @@ def of_one_body(poses: Sequence[Workpiece]) -> bool:
     return bool(np.median(np.std(logs, axis=0)) < STRETCH)
 
 
-def _touching(poses: Sequence[Workpiece], labels: Sequence[IntArray], n_parts: int) -> FloatArray:
+def touching_parts(poses: Sequence[Workpiece], labels: Sequence[IntArray], n_parts: int) -> FloatArray:
     """(parts, parts) length of the borders between taught parts on all poses."""
     table = np.zeros((n_parts, n_parts))
     for pose, part in zip(poses, labels, strict=True):

@@ -23,7 +23,7 @@ NOT_SAID = -1
 """Label of a face whose part is not said."""
 LEAST_FACES = 3
 """Fewest faces of a part on all learned meshes together: with fewer, a slip of the brush would be a part."""
-MOST_PARTS = 500
+MOST_TAUGHT = 500
 """Most taught parts: segments made by hand have the numbers from here in Blender."""
 MOST_COMPARED = 400
 """Most samples of a part that are compared with those of another one."""
@@ -216,11 +216,11 @@ def checked_labels(labels: Sequence[IntArray | None], n_faces: Sequence[int]) ->
         whole = np.issubdtype(given.dtype, np.integer) or (
             np.issubdtype(given.dtype, np.floating) and bool((np.trunc(given) == given).all())
         )
-        if not whole or (count and (given.min() < NOT_SAID or given.max() >= MOST_PARTS)):
+        if not whole or (count and (given.min() < NOT_SAID or given.max() >= MOST_TAUGHT)):
             raise ValueError(
                 Message(
                     "labels of mesh {number} must be whole numbers from 0 to {most}, or -1 where no part is said",
-                    number=i + 1, most=MOST_PARTS - 1,
+                    number=i + 1, most=MOST_TAUGHT - 1,
                 )
             )  # fmt: skip
         checked.append(given.astype(np.int64))
