@@ -86,8 +86,9 @@ def humans(options: argparse.Namespace) -> None:
 def makehuman_bones(options: argparse.Namespace) -> None:
     """Parts by the bones of MakeHuman's rig, all faces said."""
     own, others, part, names = _makehuman(options)
+    rest = makehuman.load(options.data / "makehuman").posed(0)
     learned = quality.LEARNED_FRAMES
-    model = PoseSegmentation().fit([own[name] for name in learned], labels=[part] * len(learned))
+    model = PoseSegmentation().fit([own[name] for name in learned], labels=[part] * len(learned), rest=rest)
     print(f"\n| MakeHuman, {len(names)} parts by bones | right | without sides | left/right right | worst |")
     print("|---|---|---|---|---|")
     _makehuman_rows(model, own, others, part, names)

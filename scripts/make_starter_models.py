@@ -22,7 +22,7 @@ import numpy as np
 
 from benchmarks import makehuman, rigs
 from benchmarks.bodies import other_body
-from wks_segment.core import DiskCache, PartNotes, PoseSegmentation, PoseSignature, connect
+from wks_segment.core import DiskCache, PartNotes, PoseSegmentation, PoseSignature, TriangleMesh, connect
 from wks_segment.core.mesh.triangle_mesh import IntArray
 from wks_segment.rigs import BoneTree, Skeleton, Skin, parts_of_faces, split_side, usual_rows
 
@@ -54,12 +54,15 @@ class Lesson:
         Part of each face, −1 for none.
     names : list of str
         Of the parts.
+    rest : TriangleMesh, optional
+        The first mesh at rest.
     """
 
     owner: list[str]
     poses: list[PoseSignature]
     labels: list[IntArray]
     names: list[str]
+    rest: TriangleMesh | None = None
 
     def without(self, owner: str) -> Lesson:
         """The lesson without the meshes of a body."""
@@ -70,7 +73,7 @@ class Lesson:
 
     def taught(self) -> PoseSegmentation:
         """A model that has learned the parts, with their names."""
-        model = PoseSegmentation().fit(self.poses, labels=self.labels, unlabeled="ignore")
+        model = PoseSegmentation().fit(self.poses, labels=self.labels, unlabeled="ignore", rest=self.rest)
         model.part_notes_ = PartNotes(names=dict(enumerate(self.names)))
         return model
 
@@ -99,7 +102,7 @@ def human_lesson(folder: Path, cache: DiskCache | None = None) -> Lesson:
         connection = connect(mesh, rest=body.posed(0))
         poses.append(PoseSegmentation().describe(mesh, connection, cache=cache))
         owner.append(f"body {seed}")
-    return Lesson(owner, poses, [part] * BODIES, names)
+    return Lesson(owner, poses, [part] * BODIES, names, base.posed(0))
 
 
 def quadruped_lesson(folder: Path, cache: DiskCache | None = None, rig_cache: Path = rigs.CACHE) -> Lesson:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial.distance import cdist
 
 from ..learning.taught_parts import TaughtParts
 from ..mesh.adjacency import FaceAdjacency, connected_regions
@@ -19,8 +18,8 @@ UNKNOWN_SIDE = 2
 def oriented(taught: TaughtParts, labels: IntArray, mesh: TriangleMesh, touching: FloatArray) -> TaughtParts:
     """The taught parts with those parts of pairs as `left` that lie on the left, which is +x.
 
-    In a bent pose a right hand may lie on the left. So only the pair that is farthest apart is oriented by its place,
-    and then each time a pair by one that is oriented already: by which parts touch, if any do, else by which are near.
+    In a bent pose a right hand may lie on the left. So a pair that touches another one is oriented as that one; only of
+    pairs that touch none, the one that is farthest apart is oriented by its place.
 
     Parameters
     ----------
@@ -41,13 +40,11 @@ def oriented(taught: TaughtParts, labels: IntArray, mesh: TriangleMesh, touching
     open_groups = [g for g in taught.sided.tolist() if total[left[g]] > 0 and total[right[g]] > 0]
     done: list[int] = []
     while open_groups:
-        if done:
-            pairs = [(g, h) for g in open_groups for h in done]
-            borders = {pair: _sums(touching, left, right, *pair) for pair in pairs}
-            apart = {pair: _sums(cdist(centers, centers), left, right, *pair) for pair in pairs}
-            g, h = max(pairs, key=lambda pair: (_clearness(*borders[pair]), _clearness(*apart[pair])))
-            straight, across = borders[g, h]
-            swap = straight < across if straight != across else apart[g, h][1] < apart[g, h][0]
+        pairs = [(g, h) for g in open_groups for h in done]
+        borders = {pair: _sums(touching, left, right, *pair) for pair in pairs}
+        g, h = max(pairs, key=lambda pair: _clearness(*borders[pair]), default=(-1, -1))
+        if pairs and _clearness(*borders[g, h]) > 0:
+            swap = borders[g, h][0] < borders[g, h][1]
         else:
             g = max(open_groups, key=lambda one: abs(float(centers[left[one], 0] - centers[right[one], 0])))
             swap = bool(centers[left[g], 0] < centers[right[g], 0])
