@@ -5,10 +5,12 @@ import numpy as np
 import pytest
 from builders import changes, labels_of, limbed, scene_snapshot, select
 
+from wks_segment.blender.cli.creature import build_creature
 from wks_segment.blender.workflow import model_library
 
 pytestmark = pytest.mark.usefixtures("scene")
 OPS = bpy.ops.wks_segment
+SHIPPED = model_library.STARTER_FOLDER
 
 
 @pytest.fixture
@@ -121,3 +123,14 @@ def test_a_live_setting_changes_named_parts(starter, settings):
 
 def test_starters_are_in_the_menu_of_models(starter):
     assert model_library.starters() == {"Ball": starter}
+
+
+def test_the_shipped_models_name_the_parts_of_the_creature(settings, monkeypatch, printed):
+    """The creature of the demo has four legs and a tail, and no model has seen it."""
+    monkeypatch.setattr(model_library, "STARTER_FOLDER", SHIPPED)
+    body = build_creature(bpy.context.scene)
+    settings.source = "OBJECTS"
+    select(body)
+    assert OPS.name_parts() == {"FINISHED"}
+    assert [row.name for row in settings.models] == ["Quadruped"]
+    assert {"Head", "Torso", "Tail", "Upper Hind Leg"} <= set(names_of(settings))

@@ -9,17 +9,19 @@ from copy import copy
 from dataclasses import dataclass, field
 
 import bpy
+import numpy as np
 
 from ... import core
+from ...core.mesh.triangle_mesh import FloatArray
 from ...core.message import Message
 from ...core.progress import Progress
 from ..errors import UserError
 from ..parts import part_ids
 from ..props.settings import WKSSegmentSettings
 from ..scene.characters import quoted
-from . import model_library
+from . import describing, model_library
 from .describing import Run
-from .model_ranking import NamedModel, rank_poses
+from .model_ranking import NamedModel
 from .segmentation_job import SegmentationJob
 
 RANKED_SHARE = 0.8
@@ -62,10 +64,10 @@ class StarterJob(SegmentationJob):
         if self.chosen is None:
             # Signatures that are computed for the ranking serve to label as well.
             self.cache = self.cache or core.MemoryCache()
-            run = Run(self.report, progress.part(0.0, RANKED_SHARE), self.cache)
-            ranking = rank_poses(self.starters, self.poses, run)
-            self.chosen = self.starters[ranking.best.index]
-            if not ranking.best.fits:
+            margins = self._margins(Run(self.report, progress.part(0.0, RANKED_SHARE), self.cache))
+            best = int(np.argmax(margins))
+            self.chosen = self.starters[best]
+            if margins[best] < -1.0:
                 self.report.warn(
                     Message(
                         "{names} is unlike all that the starter models ({models}) learned: check the parts, or learn a "
@@ -79,6 +81,24 @@ class StarterJob(SegmentationJob):
             self.take_number()
             progress = progress.part(RANKED_SHARE, 1.0)
         super().compute(progress)
+
+    def _margins(self, run: Run) -> FloatArray:
+        """(starters,) how far above its usual scores each model scores the poses; below −1 it does not fit.
+
+        In units of the difference that is tolerated: likelihoods alone prefer the model that has seen the most
+        different bodies, on every shape.
+        """
+        from ...core.ranking import least_usual
+
+        models = [named.model for named in self.starters]
+        margins = np.empty(len(models))
+        for alike, progress in run.progress.each(core.described_alike(models), "Reading"):
+            poses = describing.describe(models[alike[0]], self.poses, run.with_progress(progress))
+            for i in alike:
+                usual = models[i].usual_scores_
+                score = np.mean([models[i].comparable_score(each) for each in poses])
+                margins[i] = (score - usual.mean()) / (usual.mean() - least_usual(usual))
+        return margins
 
     def keep_starter(self, settings: WKSSegmentSettings) -> None:
         """Add the chosen model to the scene, if it is not there, and use it."""
