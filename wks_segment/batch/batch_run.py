@@ -171,7 +171,7 @@ class Batch:
             raise BatchError(f"--part {i}/{n}: there are only {len(self.jobs)} files")
         if self.scheduler is not None and find_spec("distributed") is None:
             raise BatchError(
-                f'--scheduler needs Dask, which is not installed in {sys.executable}: pip install "wks-segment[dask]", '
+                f'--scheduler needs Dask, which is not installed in {sys.executable}: pip install ".[dask]", '
                 "here and on the workers"
             )
 

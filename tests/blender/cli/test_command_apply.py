@@ -10,9 +10,9 @@ import pytest
 from builders import labels_of, limbed
 from command_files import QUICK, assert_fails, empty_scene, mesh_of_scene, save
 
+from wks_segment import core
 from wks_segment.blender.cli import resource_limits
 from wks_segment.blender.cli.main import answer
-from wks_segment.blender.workflow import model_ranking
 from wks_segment.core import PoseSegmentation
 
 
@@ -123,8 +123,8 @@ def test_a_model_that_asks_for_thousands_of_eigenpairs(command, folder, tmp_path
 
 
 def test_apply_says_that_a_model_does_not_fit(command, folder, model, tmp_path, monkeypatch):
-    known = model_ranking.rank
-    monkeypatch.setattr(model_ranking, "rank", lambda *given: replace(known(*given), verdict="nothing fits"))
+    known = core.rank
+    monkeypatch.setattr(core, "rank", lambda *given: replace(known(*given), verdict="nothing fits"))
     options = ("--model", model, "--output", tmp_path / "out.blend", "--smallest-part", 20, "--json")
     done = command("apply", folder / "pose_0.obj", *options)
     assert done.code == 0, done

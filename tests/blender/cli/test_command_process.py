@@ -83,6 +83,8 @@ def test_process_that_is_interrupted_while_blender_loads(tmp_path, seconds, numb
     done = ended(running)
     if done.code == 1:  # it was faster
         assert done.result == {"error": f"{tmp_path / 'missing.glb'}: there is no such file"}
+    elif done.code == -number:  # on a busy machine, Python was still starting
+        assert "in main" not in done.err
     else:
         check_interrupted(done, number)
 

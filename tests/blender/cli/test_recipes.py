@@ -51,7 +51,7 @@ def recipe_folder(extension, tmp_path_factory):
     python.write_text(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')
     python.chmod(0o755)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    rig([limbed("Walker", subdivisions=3)])
+    rig([limbed("Walker", subdivisions=4)])
     bpy.ops.export_scene.gltf(filepath=str(folder / "walk.glb"))
     for name in ("knight", "thief"):
         shutil.copy(folder / "walk.glb", folder / "characters" / f"{name}.glb")

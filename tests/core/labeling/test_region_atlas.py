@@ -97,7 +97,7 @@ def test_poses_vote_on_the_sides_of_a_mesh(model, monkeypatch):
     given = {0.0: [1, 1, 1, 0, -1, 1], 0.1: [1, 1, 0, 0, 1, 1], 0.2: [1, -1, 0, 0, -1, 0], 0.3: [1, 1, 0, 0, -1, 0]}
     poses = [TriangleMesh(mesh.vertices + (0, 0, height), mesh.faces) for height in given]
     votes = iter(given.values())
-    monkeypatch.setattr(labeler, "_sides_in_pose", lambda *arguments: np.array(next(votes)))
+    monkeypatch.setattr(labeler, "sides_in_pose", lambda *arguments: np.array(next(votes)))
     found = model.polygon_sides(poses, [np.arange(mesh.n_faces) % 6] * 4, np.zeros(6, int))
     assert found.tolist() == [1, 1, 0, 0, -1, 0]
 

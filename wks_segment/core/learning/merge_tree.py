@@ -140,8 +140,9 @@ class MergeTree:
         pairs, odds = self.pairs.tolist(), self.likeness[:0:-1].tolist()
         kept, gone = pairs.pop(count - 1 - group)
         likeness = odds.pop(count - 1 - group)
-        # Just before the last merge that `n_groups` groups need; what the group would have taken goes where it goes.
-        at = count - n_groups - 1
+        # Before all other merges of kinds, so that the next group that is lost does not undo this merge; what the group
+        # would have taken goes where it goes.
+        at = min(count - n_groups - 1, count - self.n_kinds)
         pairs[at:] = [[kept if name == gone else name for name in pair] for pair in pairs[at:]]
         pairs.insert(at, [kept, gone])
         odds.insert(at, likeness)
