@@ -163,7 +163,7 @@ class PoseSegmentation(PoseLabeling, Estimator):
         labels: Sequence[IntArray | None] | None = None,
         unlabeled: Unlabeled = "learn",
     ) -> PoseSegmentation:
-        """Learn the segments from one or more poses together, or the parts that labels say.
+        """Learn the segments from one or more poses together, or the parts given by `labels`.
 
         Parameters
         ----------
@@ -180,12 +180,13 @@ class PoseSegmentation(PoseLabeling, Estimator):
             Searched for signatures, creases and kinds of parts; new ones are added to it. A fit to the same poses with
             another number of segments then takes a fraction of the time, as long as the number of regions of the mesh
             (see `with_segments`) is the same. The result is exactly the same as without a cache.
-        labels, optional
-            To teach parts: for each mesh an (m,) array of the part of each face, 0, 1, … without gaps, and -1 where
-            nothing is said; None if all are -1. Segments have these numbers, left and right parts their own.
+        labels : sequence of int arrays or None, optional
+            To teach parts: for each mesh an (m,) array with the part of each face (0, 1, … without gaps; -1 for no
+            part), or None if no face of the mesh has a part. Segments get these numbers; left and right are two parts.
         unlabeled : "learn" or "ignore"
-            What becomes of faces of which nothing is said. "learn": they are cut as usual into as many segments as
-            `n_segments` has beyond the taught parts, at least one, numbered after these. "ignore": they have no say.
+            What becomes of faces without a part (-1). "learn": they are cut as usual into as many segments as
+            `n_segments` has beyond the taught parts, at least one, numbered after these. "ignore": nothing is learned
+            from them, and each gets the taught part that fits it best.
 
         Raises
         ------
