@@ -112,22 +112,18 @@ def human(options: argparse.Namespace) -> None:
     cache = None if options.signatures is None else DiskCache(options.signatures)
     model = PoseSegmentation.load(starters.TARGET / "human.json")
     names = [model.part_notes_.names[part] for part in range(model.taught_.n_parts)]  # type: ignore[union-attr]
-    plain = [split_side(name)[0] for name in names]
     truth, described = princeton.read(options.data / "psb", "human", options.signatures)
     print("\n| *Human* on | right | left/right right |\n|---|---|---|")
     each, drawn = [], {}
     for shape, pose in described.items():
         found = model.segment_faces(pose)
-        known = truth[shape]["part_names"]
-        of_names = np.array([PRINCETON_NAMES.get(name, "") for name in plain])[found]
-        neck = np.isin(np.array(plain)[found], ["Neck"]) & np.isin(known, ["head", "torso"])
-        each.append(_share(pose, (of_names == known) | neck))
+        each.append(named_right(pose, found, names, truth[shape]["part_names"]))
         drawn[f"{shape} {each[-1]:.2f}"] = pose, found
     print(table_row([f"Princeton humans (worst {min(each):.3f})", f"{np.mean(each):.3f}", ""]), flush=True)
     characters, shapes = [], dict(drawn)
     for name in PEOPLE:
         path = next(options.data.glob(f"{name}.*"))
-        row, pose, found = _on_rig(model, names, rigs.load(path, options.output / "rigs"), cache)
+        row, pose, found = on_rig(model, names, rigs.load(path, options.output / "rigs"), cache)
         characters.append(row)
         print(table_row([name, *(f"{value:.3f}" for value in row)]), flush=True)
         shapes[f"{name} {row[0]:.2f}"] = pose, found
@@ -143,7 +139,7 @@ def quadruped(options: argparse.Namespace) -> None:
     print("\n| *Quadruped* without | right | left/right right |\n|---|---|---|")
     for animal in starters.ANIMALS:
         rig = rigs.load(options.data / "characters" / f"{animal}.glb", options.output / "rigs")
-        row, pose, found = _on_rig(lesson.without(animal).taught(), lesson.names, rig, cache)
+        row, pose, found = on_rig(lesson.without(animal).taught(), lesson.names, rig, cache)
         rows.append(row)
         print(table_row([animal, *(f"{value:.3f}" for value in row)]), flush=True)
         shapes[f"{animal} {row[0]:.2f}"] = pose, found
@@ -166,6 +162,24 @@ def stroke(pose: PoseSignature, part: IntArray) -> IntArray:
         near = np.linalg.norm(mesh.face_centers[inside] - middle, axis=1)
         said[inside[np.argsort(near)[: max(3, round(STROKE * len(inside)))]]] = each
     return said
+
+
+def named_right(pose: PoseSignature, found: IntArray, names: Sequence[str], known: IntArray) -> float:
+    """Share of the area of a Princeton human whose part has the name that people gave it.
+
+    Parameters
+    ----------
+    pose : PoseSignature
+    found : (m,) int array
+        Part of each face, of `names`.
+    names : list of str
+    known : (m,) str array
+        Name of the benchmark for each face.
+    """
+    plain = np.array([split_side(name)[0] for name in names])
+    of_names = np.array([PRINCETON_NAMES.get(name, "") for name in plain])[found]
+    neck = (plain[found] == "Neck") & np.isin(known, ["head", "torso"])
+    return _share(pose, (of_names == known) | neck)
 
 
 def fits(name: str, bone: str, of_rig: Sequence[str]) -> bool:
@@ -230,7 +244,7 @@ def _right(
     return exact, float(np.average(right, weights=areas)), of_sides
 
 
-def _on_rig(
+def on_rig(
     model: PoseSegmentation, names: Sequence[str], rig: rigs.Rig, cache: DiskCache | None
 ) -> tuple[tuple[float, float], PoseSignature, IntArray]:
     """Share of the area with a name that fits the bone, and with the right side; the mesh at rest, and its parts."""

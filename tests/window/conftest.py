@@ -90,7 +90,7 @@ def shot(blender, request):
 def quiet(request):
     """Fail a test that leaves a warning or an error on the terminal."""
     yield
-    if {"window", "pair"} & set(request.fixturenames):
+    if {"window", "pair", "opened"} & set(request.fixturenames):
         assert complaints(request.getfixturevalue("blender").log()) == []
 
 

@@ -88,6 +88,13 @@ def place_of(name):
     return [int(area.x + spot.x), int(_window().height - area.y - spot.y)]
 
 
+def place_at(name, point):
+    """[x, y] of a point in the space of an object."""
+    area, space = _region("WINDOW"), _view3d().spaces.active.region_3d
+    spot = location_3d_to_region_2d(area, space, bpy.data.objects[name].matrix_world @ Vector(point))
+    return [int(area.x + spot.x), int(_window().height - area.y - spot.y)]
+
+
 def view():
     """Numbers of the view matrix."""
     return [value for row in _view3d().spaces.active.region_3d.view_matrix for value in row]
@@ -136,6 +143,11 @@ def segments(name):
         return {}
     found = np.unique(_values(mesh, "wks_segment"), return_counts=True)
     return {str(part): int(count) for part, count in zip(*found, strict=True)}
+
+
+def parts_of_faces(name):
+    """Number of the part of each face of an object that has segments."""
+    return _values(bpy.data.objects[name].data, "wks_segment").tolist()
 
 
 def clipboard():

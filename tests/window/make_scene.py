@@ -43,7 +43,8 @@ def pair():
 def bodies(path):
     """Add the bodies of a file side by side, all selected."""
     with np.load(path) as arrays:
-        for i in range(len(arrays.files) // 2):
+        count = len(arrays.files) // 2
+        for i in range(count):
             mesh = bpy.data.meshes.new(f"Pose {i + 1}")
             mesh.from_pydata(arrays[f"vertices_{i}"].tolist(), [], arrays[f"faces_{i}"].tolist())
             obj = bpy.data.objects.new(mesh.name, mesh)
@@ -51,7 +52,8 @@ def bodies(path):
             bpy.context.scene.collection.objects.link(obj)
             obj.select_set(True)
             bpy.context.view_layer.objects.active = obj
-    bpy.context.scene.wks_segment.source = "OBJECTS"
+    if count > 1:
+        bpy.context.scene.wks_segment.source = "OBJECTS"
 
 
 content, out = sys.argv[sys.argv.index("--") + 1 :]

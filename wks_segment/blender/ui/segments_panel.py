@@ -25,6 +25,10 @@ NAME_PRESETS = {
 """Names to choose from, without the suffix of a side, which comes with the part."""
 
 
+ROWS = 8
+"""Rows of the list: as many segments as are learned by default, half of the named parts of a person."""
+
+
 class WKS_SEGMENT_UL_segments(bpy.types.UIList):
     """Row of the list: color, name, share of the area, visibility."""
 
@@ -105,7 +109,7 @@ class WKS_SEGMENT_PT_segments(SubPanel, bpy.types.Panel):
         settings, layout = context.scene.wks_segment, self.layout
         row = layout.row()
         row.template_list(
-            WKS_SEGMENT_UL_segments.__name__, "", settings, "segments", settings, "active_segment", rows=5
+            WKS_SEGMENT_UL_segments.__name__, "", settings, "segments", settings, "active_segment", rows=ROWS
         )
         column = row.column(align=True)
         column.operator("wks_segment.select_segment", text="", icon="RESTRICT_SELECT_OFF")

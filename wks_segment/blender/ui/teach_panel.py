@@ -20,6 +20,7 @@ class WKS_SEGMENT_UL_bones(bpy.types.UIList):
         self, context: bpy.types.Context, layout: Any, data: Any, item: Any, icon: int, active_data: Any, *_: Any
     ) -> None:
         row = layout.row(align=True)
+        row.use_property_split = False  # the panel has it, and a box without a name would be moved to the middle
         for _level in range(item.depth):
             row.separator(factor=INDENT)
         if _has_children(data.bones, item):
@@ -70,7 +71,7 @@ class WKS_SEGMENT_PT_teach(SubPanel, bpy.types.Panel):
             self.layout.operator("wks_segment.list_bones", icon="OUTLINER_OB_ARMATURE")
             if settings.bones:
                 self.layout.template_list(
-                    WKS_SEGMENT_UL_bones.__name__, "", settings, "bones", settings, "active_bone", rows=6
+                    WKS_SEGMENT_UL_bones.__name__, "", settings, "bones", settings, "active_bone", rows=8
                 )
         row = self.layout.row()
         row.scale_y = 1.4
