@@ -25,7 +25,7 @@ BRIGHT_COLORS = (
     (1, 0, 0), (0, 0.26, 1), (0, 1, 0), (0, 0.48, 0),
     (1, 0.52, 1), (0.04, 0.70, 0.87), (1, 0.74, 0.39), (0.65, 0, 0.65),
 )  # fmt: skip
-"""The first eight colors of *Maximally Different*: pure red, and seven with a lightness above 0.5 and a chroma above 0.13.
+"""First eight colors of *Maximally Different*: pure red, and seven with a lightness above 0.5 and a chroma above 0.13.
 Of the sets that exchanging single colors of 60 random sets led to, this one is the farthest apart, 0.27 in OKLab, and
 its order keeps the first few as far apart as they can be. Colors chosen one after the other would be as far apart, but
 the fourth is nearly black."""
