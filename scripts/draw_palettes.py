@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from wks_segment.blender.parts.palette import BLINDNESS, RECIPES, linear, sided_palette
+from wks_segment.blender.parts.palette import BLINDNESS, RECIPES, as_srgb, linear, sided_palette
 from wks_segment.core.mesh.triangle_mesh import FloatArray
 
 N_COLORS = 16
@@ -46,8 +46,7 @@ def main(path: Path) -> None:
 def _bytes(srgb: FloatArray, eyes: FloatArray) -> list[list[int]]:
     """(n, 3) sRGB colors in 8 bits, as seen by eyes that a (3, 3) matrix on linear RGB describes."""
     light = np.clip(linear(srgb) @ eyes.T, 0, 1)
-    perceived = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-    rounded: list[list[int]] = np.rint(255 * perceived).astype(int).tolist()
+    rounded: list[list[int]] = np.rint(255 * as_srgb(light)).astype(int).tolist()
     return rounded
 
 

@@ -13,7 +13,7 @@ from command_files import QUICK, assert_fails, empty_scene, mesh_of_scene, save
 from wks_segment import core
 from wks_segment.blender.cli import resource_limits
 from wks_segment.blender.cli.main import answer
-from wks_segment.core import PoseSegmentation
+from wks_segment.core import PartNotes, PoseSegmentation
 
 
 @pytest.fixture
@@ -51,6 +51,18 @@ def test_apply_gives_an_unseen_pose_the_labels_of_the_learned_ones(command, fold
         labels[name] = labels_of(mesh_of_scene())
     # Importers rotate axes, and number faces as the file does; both files have the same order of faces.
     assert (labels["known"] == labels["unseen"]).mean() > 0.9
+
+
+def test_apply_counts_merged_parts(command, folder, model, tmp_path):
+    """As the list in the panel counts them; the warning on segments that are missing is about others."""
+    learned = PoseSegmentation.load(model)
+    learned.part_notes_ = PartNotes(joined={2: 1})
+    learned.save(model)
+    apply = ("apply", folder / "pose_1.obj", "--model", model, "--output", tmp_path / "out.blend")
+    done = command(*apply, "--json")
+    assert (done.result["segments"], len(done.result["parts"]), done.result["merged"]) == (3, 3, 1)
+    assert not [warning for warning in done.result["warnings"] if "are not on these objects" in warning]
+    assert "3 segments, 1 merged into another\n" in command(*apply).out
 
 
 def test_apply_reads_frames(command, folder, model, tmp_path):

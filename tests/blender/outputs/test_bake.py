@@ -106,7 +106,7 @@ def image_of(obj):
 # What is in the image
 
 
-@pytest.mark.parametrize("palette", ["calm", "maximal", "color_blind"])
+@pytest.mark.parametrize("palette", ["calm", "distinct", "color_blind"])
 def test_every_pixel_has_the_color_of_the_face_that_covers_it(labeled, settings, palette):
     settings.palette = palette
     assert OPS.bake() == {"FINISHED"}

@@ -1,5 +1,7 @@
 """Colors: the same for a segment whatever the number of segments, and clearly different for people."""
 
+import hashlib
+
 import numpy as np
 import pytest
 
@@ -90,8 +92,7 @@ BLINDNESS = {
 
 def as_seen(srgb, eyes):
     """sRGB colors as somebody sees them."""
-    light = np.clip(module.linear(srgb) @ np.array(eyes).T, 0, 1)
-    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    return module.as_srgb(np.clip(module.linear(srgb) @ np.array(eyes).T, 0, 1))
 
 
 def closest(srgb):
@@ -123,9 +124,31 @@ def test_the_calm_palette_is_not_color_blind_safe():
     assert min(closest(as_seen(palette()[:8], eyes)) for eyes in BLINDNESS.values()) < 0.06
 
 
-@pytest.mark.parametrize(("count", "least"), [(8, 0.27), (16, 0.17), (MAX_COLORS, 0.09)])
-def test_maximally_different_colors_are_farther_apart_than_the_calm_ones(count, least):
-    assert closest(palette("maximal")[:count]) > max(least, 1.2 * closest(palette()[:count]))
+@pytest.mark.parametrize("name", ["distinct", "maximal"])
+@pytest.mark.parametrize(("count", "least"), [(4, 0.38), (8, 0.27), (16, 0.17), (MAX_COLORS, 0.09)])
+def test_maximally_different_colors_are_farther_apart_than_the_calm_ones(count, least, name):
+    assert closest(palette(name)[:count]) > max(least, 1.2 * closest(palette()[:count]))
+
+
+def test_the_first_maximally_different_colors_are_bright():
+    lab = oklab(palette("distinct")[:8])
+    assert palette("distinct")[0].tolist() == [1, 0, 0]
+    assert lab[:, 0].min() > 0.49
+    assert np.hypot(lab[:, 1], lab[:, 2]).min() > 0.12
+
+
+@pytest.mark.parametrize(
+    ("name", "number", "digest"),
+    [("calm", 0, "78b7704846f7236a"), ("maximal", 1, "470cd29ccc48455a"), ("color_blind", 2, "1b130c2cc98c6c01")],
+)
+def test_palettes_that_files_have_keep_their_number_and_colors(name, number, digest):
+    colors = np.round(sided_palette(name), 6)
+    assert (module.RECIPES[name].number, hashlib.sha256(colors.tobytes()).hexdigest()[:16]) == (number, digest)
+
+
+def test_srgb_is_the_inverse_of_linear():
+    colors = np.linspace(0, 1, 256)
+    np.testing.assert_allclose(module.as_srgb(module.linear(colors)), colors, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", module.RECIPES)

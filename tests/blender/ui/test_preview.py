@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from builders import changes, labels_of, limbed_rigged, scene_snapshot, select, snapshot
 
-from wks_segment.blender.parts.palette import colors_of
-from wks_segment.blender.ui.preview import DARKEST_SHADE, SURFACE_OFFSET, preview_triangles
+from wks_segment.blender.parts.palette import colors_of, linear
+from wks_segment.blender.ui.preview import SHADES, SURFACE_OFFSET, preview_triangles
 from wks_segment.blender.workflow.live_session import session_of
 
 pytestmark = pytest.mark.usefixtures("scene")
@@ -128,10 +128,27 @@ def test_preview_matches_the_evaluated_surface(walker, settings, session):
     nearest = np.linalg.norm(places[::50, None] - seen, axis=2).min(axis=1)
     np.testing.assert_allclose(nearest, SURFACE_OFFSET * size, rtol=1e-3)
     assert (colors[:, 3] == 1).all()
-    plain = colors_of(np.repeat(labels, 6))
-    shade = colors[::3, :3].max(axis=1) / plain.max(axis=1)
-    np.testing.assert_allclose(colors[::3, :3], plain * shade[:, None], atol=1e-6)
-    assert DARKEST_SHADE - 1e-6 <= shade.min() < shade.max() <= 1 + 1e-6
+    plain = linear(colors_of(np.repeat(labels, 18)))
+    light = linear(colors[:, :3]).max(axis=1) / plain.max(axis=1)
+    np.testing.assert_allclose(linear(colors[:, :3]), plain * light[:, None], atol=1e-6)
+    assert SHADES[0] - 1e-6 <= light.min() < light.max() <= SHADES[1] + 1e-6
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_preview_is_as_smooth_as_the_mesh(walker, session, smooth):
+    """The light differs between the corners of a face only where the mesh is shaded smooth."""
+    walker.data.polygons.foreach_set("use_smooth", [smooth] * len(walker.data.polygons))
+    (character,) = {pose.character for pose in session.job.poses}
+    labels = np.zeros(len(walker.data.polygons), dtype=int)
+    places, colors = preview_triangles(bpy.context, {character: labels}, {})
+    differs = np.ptp(colors[:, 0].reshape(-1, 3), axis=1) > 1e-3
+    assert differs.mean() > 0.5 if smooth else not differs.any()
+    if smooth:
+        # No seam between faces: a place has the same color in all of them.
+        _, place = np.unique(np.round(places, 5), axis=0, return_inverse=True)
+        order = np.argsort(place.ravel())
+        same = np.diff(place.ravel()[order]) == 0
+        assert np.abs(np.diff(colors[order, 0]))[same].max() < 1e-3
 
 
 def test_preview_of_nothing_is_empty():

@@ -97,7 +97,7 @@ ACTIONS = {
     "number": lambda settings, number: setattr(settings, "n_segments", 2 + number % 5),
     "smoothness": lambda settings, number: setattr(settings, "smoothness", number / 5),
     "smallest part": lambda settings, number: setattr(settings, "min_share", number / 2),
-    "palette": lambda settings, number: setattr(settings, "palette", ("calm", "maximal", "color_blind")[number % 3]),
+    "palette": lambda settings, number: setattr(settings, "palette", ("calm", "distinct", "color_blind")[number % 3]),
     "materials": lambda settings, number: setattr(settings, "write_materials", bool(number % 3)),
     "groups": lambda settings, number: setattr(settings, "vertex_groups", ("none", "hard", "soft")[number % 3]),
     "live": lambda settings, number: setattr(settings, "live", bool(number % 4)),

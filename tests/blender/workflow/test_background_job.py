@@ -114,7 +114,7 @@ def test_writing_waits_for_object_mode(poses, hold_at):
     ran.thread_job.wait(TIMEOUT)
     for _ in range(3):
         assert ran.step(bpy.context) == RUNNING
-    assert ran.thread_job.stage == "Done, to be written in Object Mode"
+    assert ran.thread_job.stage == "Done: written once you are in Object Mode"
     assert "wks_segment" not in poses[0].data.attributes
     bpy.ops.object.mode_set(mode="OBJECT")
     assert finish_job(ran) == {"FINISHED"}

@@ -13,6 +13,7 @@ from wks_segment.blender.workflow import pipeline
 from wks_segment.blender.workflow.first_colors import first_colors_of
 from wks_segment.blender.workflow.segmentation_job import SegmentationJob
 from wks_segment.core import MemoryCache
+from wks_segment.core.draft import segments
 from wks_segment.core.progress import Progress
 
 pytestmark = pytest.mark.usefixtures("scene")
@@ -141,7 +142,7 @@ def test_no_draft_without_need(poses, settings, colors, monkeypatch, why):
 
 
 def test_scripts_and_apply_have_no_draft(poses, drafts, monkeypatch):
-    monkeypatch.setattr(pipeline, "draft", lambda *_: pytest.fail("nobody would see it"))
+    monkeypatch.setattr(segments, "draft", lambda *_: pytest.fail("nobody would see it"))
     assert OPS.learn() == {"FINISHED"}
     ran, result = run(APPLY)
     assert result == {"FINISHED"}
@@ -149,7 +150,7 @@ def test_scripts_and_apply_have_no_draft(poses, drafts, monkeypatch):
 
 
 def test_job_goes_on_without_a_draft(poses, drafts, colors, monkeypatch):
-    monkeypatch.setattr(pipeline, "draft", lambda *_: None)
+    monkeypatch.setattr(segments, "draft", lambda *_: None)
     ran, result = run(LEARN)
     assert result == {"FINISHED"}
     assert ran.job.draft == {}

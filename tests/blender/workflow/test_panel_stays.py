@@ -16,15 +16,16 @@ OPS = bpy.ops.wks_segment
 
 
 class Layout:
-    """A layout that knows where things are: (top, height) by the name of a button or setting."""
+    """A layout that knows where things are: (top, height) by the name of a button or setting. And texts and icons."""
 
-    def __init__(self, top=0.0, is_row=False):
+    def __init__(self, top=0.0, is_row=False, texts=None, icons=None):
+        self.texts, self.icons = ([], []) if texts is None else (texts, icons)
         self.top, self.height, self.is_row, self.scale_y = top, 0.0, is_row, 1.0
         self.children, self.places = [], {}
 
     def _inner(self, is_row):
         self._close()
-        child = Layout(self.top if self.is_row else self.top + self.height, is_row)
+        child = Layout(self.top if self.is_row else self.top + self.height, is_row, self.texts, self.icons)
         self.children.append(child)
         return child
 
@@ -52,6 +53,7 @@ class Layout:
 
     def label(self, text="", **_):
         self._leaf()
+        self.texts.append(text)
 
     def prop(self, owner, name, **_):
         self._leaf(name)
@@ -59,11 +61,11 @@ class Layout:
     def progress(self, **_):
         self._leaf()
 
-    def operator(self, name, **_):
+    def operator(self, name, *_, icon="NONE", **__):
         self._leaf(name)
+        self.icons.append(icon)
 
-    def operator_menu_enum(self, name, *_, **__):
-        self._leaf(name)
+    operator_menu_enum = operator
 
     def menu(self, name, **_):
         self._leaf(name)
@@ -76,11 +78,17 @@ class Layout:
         self._grow(rows)
 
 
-def places(panel):
-    """Where everything in a panel is, and how high it is."""
+def drawn(panel):
+    """The layout of a panel once it is drawn."""
     layout = Layout()
     panel.draw(type("Shown", (panel.__bases__[0],), {"layout": layout})(), bpy.context)
     layout._close()
+    return layout
+
+
+def places(panel):
+    """Where everything in a panel is, and how high it is."""
+    layout = drawn(panel)
     return layout.places, round(layout.height, 6)
 
 
@@ -142,8 +150,40 @@ def test_segments_panel_has_one_height_in_every_state(settings):
     assert height() == before
     settings.faces_by_hand = 12
     assert height() == before
+    settings.preview = True
+    settings.n_segments = 3
+    rest(session_of(bpy.context))
+    assert session_of(bpy.context).proposed is not None
+    assert height() == before
+    OPS.discard()
     bpy.ops.object.mode_set(mode="EDIT")
     assert height() == before
+
+
+def test_a_preview_is_named_as_one(settings):
+    """The list is gray and says that it shows what is written, since the viewport shows something else."""
+    job_holder(bpy.context).release()
+    select(limbed())
+    OPS.learn()
+    settings.preview = True
+    written = len(settings.segments)
+    assert drawn(segments_panel.WKS_SEGMENT_PT_segments).texts == [""]
+    settings.n_segments = 2
+    rest(session_of(bpy.context))
+    assert main_panel.status(bpy.context).startswith("Preview in the viewport only")
+    assert len(settings.segments) == written > 2
+    assert drawn(segments_panel.WKS_SEGMENT_PT_segments).texts == ["These are the written segments"]
+    OPS.accept()
+    assert len(settings.segments) == 2
+    assert drawn(segments_panel.WKS_SEGMENT_PT_segments).texts == [""]
+
+
+def test_buttons_below_each_other_have_different_icons(settings):
+    """Accept and Discard appear instead of Update; Clear and Discard both take back."""
+    panels = (main_panel.WKS_SEGMENT_PT_main, main_panel.WKS_SEGMENT_PT_outputs, main_panel.WKS_SEGMENT_PT_bake)
+    icons = [icon for panel in panels for icon in drawn(panel).icons]
+    assert len(icons) > 8
+    assert len(set(icons)) == len(icons)
 
 
 @pytest.mark.parametrize("materials", [False, True])
@@ -158,7 +198,10 @@ def test_the_panel_says_whose_segments_it_shows(settings):
     obj = limbed()
     select(obj)
     OPS.learn()
-    model = settings.models[settings.used_model].name
+    row = settings.models[settings.used_model]
+    assert row.name == obj.name
+    assert main_panel.status(bpy.context) == f'"{obj.name}": segments of the model of this name'
+    row.name = model = "Robot"
     assert main_panel.status(bpy.context) == f'"{obj.name}": segments of the model "{model}"'
     OPS.remove_model()
     session_of(bpy.context).drop()

@@ -55,6 +55,25 @@ def test_merged_segments_are_one_in_all_outputs(pair, settings):
         assert all_agrees(obj, settings)
 
 
+def test_the_report_counts_what_the_list_shows(settings, printed):
+    """Also after a merge, which it mentions."""
+    select(limbed())
+    settings.n_segments = 4
+    OPS.learn()
+    first, second, *others = settings.segments
+    assert len(others) == 2
+    settings.active_segment, told = 0, f"Merged {first.name} into {second.name}: 3 segments"
+    printed()
+    OPS.merge_segments(into=second.number)
+    assert told in printed().out
+    assert len(settings.segments) == 3
+    OPS.apply()
+    said = printed().out
+    assert ", 3 segments, 1 merged into another, " in said
+    assert "Warning" not in said
+    assert len(settings.segments) == 3
+
+
 def test_merging_needs_another_segment_of_the_list(pair, settings):
     activate(settings, 1)
     before = scene_snapshot()

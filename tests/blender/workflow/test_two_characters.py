@@ -188,7 +188,7 @@ def test_faces_by_hand_go_along_to_every_number(man, settings, session):
     assert not (by_hand(man.data) >= 0).any(), "forgotten, wherever it was"
 
 
-@pytest.mark.parametrize("palette", ["calm", "maximal", "color_blind"])
+@pytest.mark.parametrize("palette", ["calm", "distinct", "color_blind"])
 def test_made_segments_have_colors_of_their_own(man, settings, session, palette):
     settings.palette = palette
     learn(man, n_segments=3)

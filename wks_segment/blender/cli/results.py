@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core import PoseSegmentation
-from ...core.message import message_of
+from ...core.message import Message, message_of
 from ..errors import UserError
 from ..outputs.origin import Origin
 from ..outputs.overrides import merge_parts
@@ -21,7 +21,7 @@ from ..workflow import pipeline
 from ..workflow.describing import Run
 from ..workflow.followed_settings import values_of
 from ..workflow.pipeline import LabelRequest
-from ..workflow.report import Report
+from ..workflow.report import Report, merged_facts
 from .terminal import table
 
 LABELED, SOFTENED = 0.4, 0.6
@@ -88,6 +88,7 @@ def result_of(options: argparse.Namespace, report: Report) -> dict[str, Any]:
         ],
         "segments": report.n_segments,
         **({"parts": report.parts} if report.parts else {}),
+        **({"merged": report.n_merged} if report.n_merged else {}),
         **({} if report.certainty is None else {"certainty": report.certainty}),
         "notes": report.notes,
         "seconds": rounded_seconds(report),
@@ -111,8 +112,11 @@ def result_text(result: dict[str, Any]) -> str:
         for pose in result["poses"]
     ]
     stages = [[name, f"{seconds:.1f}"] for name, seconds in result["seconds"].items()]
-    count = part_ids.count_text(result["segments"], len(result.get("parts", {})))
-    lines = [table(header, rows), "", table(["stage", "seconds"], stages), "", count]
+    counts = [
+        part_ids.count_text(result["segments"], len(result.get("parts", {}))),
+        *merged_facts(result.get("merged", 0)),
+    ]
+    lines = [table(header, rows), "", table(["stage", "seconds"], stages), "", Message.joined(", ", counts)]
     if is_demo:
         lines.append(f"agreement of unseen poses: {result['agreement']:.3f} of the area has the learned label")
     lines += result["notes"]

@@ -199,7 +199,7 @@ class JobOperator(BaseOperator, Generic[J]):
         if not self.thread_job.step():
             return {"PASS_THROUGH"}
         if context.mode not in WRITABLE_MODES and self.thread_job.succeeded:
-            self.thread_job.stage = "Done, to be written in Object Mode"
+            self.thread_job.stage = "Done: written once you are in Object Mode"
             return {"PASS_THROUGH"}
         message = ""
         try:

@@ -81,7 +81,7 @@ class WKS_SEGMENT_OT_forget_faces(BaseOperator, bpy.types.Operator):
                 count += int(forgotten.sum())
                 keep_by_hand(mesh, np.where(forgotten, -1, parts))
             warnings = segment_list.rewrite_all(settings, segment_list.active_labels(settings), objects)
-        _report.tell(self, {"INFO"}, Message("{count:,} faces have the segment of the model again", count=count))
+        _report.tell(self, {"INFO"}, Message("Restored the segment of the model on {count:,} faces", count=count))
         _report.tell_warnings(self, warnings)
         return {"FINISHED"}
 

@@ -40,6 +40,6 @@ class WKS_SEGMENT_OT_load_model(BaseOperator, bpy.types.Operator, ImportHelper):
         summary = summary or [Message("From {names}", names=path.name), Message("{count} segments", count=count)]
         model_library.add_model(context.scene.wks_segment, model, path.stem, summary)
         _report.tell(
-            self, {"INFO"}, Message("Loaded a model of {count} segments from {file}", count=count, file=path.name)
+            self, {"INFO"}, Message("Imported a model of {count} segments from {file}", count=count, file=path.name)
         )
         return {"FINISHED"}

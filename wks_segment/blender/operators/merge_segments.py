@@ -56,7 +56,10 @@ class WKS_SEGMENT_OT_merge_segments(BaseOperator, bpy.types.Operator):
         segment_list.activate(settings, into)
         _report.tell(
             self, {"INFO"},
-            Message("Merged {segment} into {other}", segment=style.name_of(part), other=style.name_of(into)),
+            Message(
+                "Merged {segment} into {other}: {left}",
+                segment=style.name_of(part), other=style.name_of(into), left=segment_list.count_of(settings),
+            ),
         )  # fmt: skip
         _report.tell_warnings(self, warnings)
         return {"FINISHED"}

@@ -20,7 +20,7 @@ def _any_model(context: bpy.types.Context) -> Message | None:
     """
     if context.scene.wks_segment.model or model_folder(context) or model_library.starters():
         return None
-    return Message("No model yet: learn one, import one, or set Model Folder in the preferences")
+    return Message("No model yet: learn one, import one, or set Model Folder in the preferences of the add-on")
 
 
 class WKS_SEGMENT_OT_rank(JobOperator[RankingJob], bpy.types.Operator):

@@ -14,15 +14,16 @@ from ..workflow.followed_settings import follow_active
 from . import _needs, _report
 from ._base import BaseOperator
 
-AS_THE_MODEL = "The segments are as in the model"
-"""What Restore says, whether it has done something or there was nothing to do."""
-
 
 def _edited_segments(context: bpy.types.Context) -> Message | None:
     """A message if the user has not merged, split or made a segment."""
     settings = context.scene.wks_segment
     merged = settings.notes(segment_list.active_labels(settings)).joined
-    return None if settings.faces_by_hand or merged else Message(AS_THE_MODEL)
+    return (
+        None
+        if settings.faces_by_hand or merged
+        else Message("The segments are as in the model: there is nothing to restore")
+    )
 
 
 class WKS_SEGMENT_OT_restore_segments(BaseOperator, bpy.types.Operator):
@@ -41,7 +42,7 @@ class WKS_SEGMENT_OT_restore_segments(BaseOperator, bpy.types.Operator):
             keep_by_hand(mesh, np.full(len(mesh.polygons), -1))
         settings.keep_notes(replace(settings.notes(labels), joined={}), labels)
         warnings = segment_list.rewrite_all(settings, labels)
-        _report.tell(self, {"INFO"}, AS_THE_MODEL)
+        _report.tell(self, {"INFO"}, Message("Restored the segments of the model"))
         _report.tell_warnings(self, warnings)
         return {"FINISHED"}
 

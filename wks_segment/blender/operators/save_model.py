@@ -42,5 +42,5 @@ class WKS_SEGMENT_OT_save_model(BaseOperator, bpy.types.Operator, ExportHelper):
             model_library.save(model, path, model_library.summary_of(settings))
         except (UserError, ValueError, OSError) as error:
             raise UserError("The model was not saved: {reason}", reason=message_of(error)) from error
-        _report.tell(self, {"INFO"}, Message("Saved the model to {path}", path=path))
+        _report.tell(self, {"INFO"}, Message("Exported the model to {path}", path=path))
         return {"FINISHED"}

@@ -65,7 +65,7 @@ class WKS_SEGMENT_OT_segments_from(BaseOperator, bpy.types.Operator):
         if settings.write_colors:
             _report.show_colors(context)
         _report.tell_warnings(self, report.warnings)
-        _report.tell(self, {"INFO"}, Message("{count} segments taken over", count=n_parts))
+        _report.tell(self, {"INFO"}, Message("Took over {count} segments", count=n_parts))
         return {"FINISHED"}
 
 

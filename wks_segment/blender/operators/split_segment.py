@@ -21,7 +21,7 @@ class WKS_SEGMENT_OT_split_segment(BaseOperator, bpy.types.Operator):
     """Make each connected region of the active segment a segment of its own, if it is not below Smallest Part"""
 
     bl_idname = "wks_segment.split_segment"
-    bl_label = "Split Segment into Connected Parts"
+    bl_label = "Split Segment into Connected Regions"
     bl_options = {"REGISTER", "UNDO"}
 
     needs = (_needs.object_mode, _needs.active_segment)
@@ -42,7 +42,9 @@ class WKS_SEGMENT_OT_split_segment(BaseOperator, bpy.types.Operator):
                 count=count,
             )
         if count < 2:
-            message = Message("{segment} is one connected region on these objects; nothing to split", segment=name)
+            message = Message(
+                "{segment} is one connected region on these objects: there is nothing to split", segment=name
+            )
             _report.tell(self, {"WARNING"}, message)
             return {"CANCELLED"}
         base, side = part_ids.without_side(name), part // part_ids.SIDE_STEP
@@ -54,6 +56,6 @@ class WKS_SEGMENT_OT_split_segment(BaseOperator, bpy.types.Operator):
                 new_parts = part_of_region[np.maximum(regions[polygons], 0)]
                 keep_by_hand(obj.data, np.where(new_parts < 0, by_hand(obj.data), new_parts))
         warnings = segment_list.rewrite_all(settings, labels, objects)
-        _report.tell(self, {"INFO"}, Message("Split {segment} into {count} parts", segment=name, count=count))
+        _report.tell(self, {"INFO"}, Message("Split {segment} into {count} segments", segment=name, count=count))
         _report.tell_warnings(self, warnings)
         return {"FINISHED"}

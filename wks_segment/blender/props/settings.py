@@ -283,7 +283,7 @@ class WKSSegmentSettings(TeachSettings, bpy.types.PropertyGroup):
     palette: EnumProperty(
         name="Palette",
         description="Colors of the segments",
-        items=[(name, recipe.title, recipe.description) for name, recipe in RECIPES.items()],
+        items=[(name, recipe.title, recipe.description, recipe.number) for name, recipe in RECIPES.items()],
         default=DEFAULT_PALETTE,
         update=_palette_chosen,
     )

@@ -145,7 +145,7 @@ class WKS_SEGMENT_PT_outputs(SubPanel, bpy.types.Panel):
 
         column = self.layout.column(align=True)
         column.operator("wks_segment.unwrap", icon="UV")
-        column.operator("wks_segment.separate", icon="MOD_EXPLODE")
+        column.operator("wks_segment.separate", icon="MOD_EDGESPLIT")
         column.operator("wks_segment.transfer", icon="MOD_DATA_TRANSFER")
         column.operator_menu_enum("wks_segment.segments_from", "source", icon="LOOP_BACK")
 

@@ -13,16 +13,19 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from ...core.mesh.triangle_mesh import FloatArray, IntArray
+from ...core.mesh.triangle_mesh import BoolArray, FloatArray, IntArray
+from ..parts.palette import as_srgb, linear
 from ..parts.part_style import PLAIN, Style
 from ..scene import poses as reader
+from ..scene.attributes import read_bools
 from ..scene.characters import Character
 
 SURFACE_OFFSET = 2e-3
 """Height of the preview above the surface as a share of the character's size. With less the surface shows through from
 afar; with more the outline grows visibly."""
-DARKEST_SHADE = 0.55
-"""Brightness of faces edge-on to the light. With less, dark colors look alike there; with more, the form gets lost."""
+SHADES = (0.22, 0.7)
+"""Linear light on faces edge-on to the light and facing it. In pictures of Blender's *Solid* shading, four fifths of a
+creature have a light from 0.2 to 0.5; with these, and the light from the side, so has the preview."""
 LIGHT_DIRECTION = np.array([0.3, -0.5, 0.8])
 """Direction to the light: from above, in front of a character that looks along -y, as in Blender's front view."""
 
@@ -31,6 +34,8 @@ def preview_triangles(
     context: bpy.types.Context, labels: Mapping[Character, IntArray], styles: Mapping[Character, Style]
 ) -> tuple[FloatArray, FloatArray]:
     """(3 t, 3) corners of the characters' triangles in their current pose, a little above them, and (3 t, 4) colors.
+
+    The colors are sRGB, shaded in linear light as *Solid* shades the written ones.
 
     Parameters
     ----------
@@ -50,17 +55,18 @@ def preview_triangles(
         faces = mesh.faces[labeled]
         a, b, c = (mesh.vertices[faces[:, i]] for i in range(3))
         normals = np.cross(b - a, c - a)
-        vertex_normals = indicator(faces.ravel(), mesh.n_vertices) @ np.repeat(normals, 3, axis=0)
-        # Both sides of a face are lit, since faces may be flipped.
-        light = LIGHT_DIRECTION / np.linalg.norm(LIGHT_DIRECTION)
-        shade = DARKEST_SHADE + (1 - DARKEST_SHADE) * np.abs(_unit(normals) @ light)
+        vertex_normals = _unit(indicator(faces.ravel(), mesh.n_vertices) @ np.repeat(normals, 3, axis=0))
+        smooth = _smooth_polygons(character)[polygon_of[labeled]]
+        corner_normals = np.where(smooth[:, None, None], vertex_normals[faces], _unit(normals)[:, None])
         size = float(np.ptp(mesh.vertices, axis=0).max())
         # Raised along vertex normals: along face normals gaps would open between faces.
-        corners.append((mesh.vertices + SURFACE_OFFSET * size * _unit(vertex_normals))[faces].reshape(-1, 3))
-        face_colors = np.ones((len(labeled), 4))
-        style = styles.get(character, PLAIN)
-        face_colors[:, :3] = style.colors_of(parts[polygon_of[labeled]]) * shade[:, None]
-        colors.append(np.repeat(face_colors, 3, axis=0))
+        corners.append((mesh.vertices + SURFACE_OFFSET * size * vertex_normals)[faces].reshape(-1, 3))
+        face_colors = styles.get(character, PLAIN).colors_of(parts[polygon_of[labeled]])
+        corner_colors = np.ones((3 * len(labeled), 4))
+        corner_colors[:, :3] = as_srgb(
+            np.repeat(linear(face_colors), 3, axis=0) * _light_on(corner_normals.reshape(-1, 3))[:, None]
+        )
+        colors.append(corner_colors)
     return np.concatenate(corners), np.concatenate(colors)
 
 
@@ -108,6 +114,18 @@ class ViewportPreview:
         self._batch.draw(shader)
         gpu.state.depth_mask_set(False)
         gpu.state.depth_test_set("NONE")
+
+
+def _light_on(normals: FloatArray) -> FloatArray:
+    """(n,) linear light on surfaces with (n, 3) unit normals. Both sides are lit, since faces may be flipped."""
+    darkest, brightest = SHADES
+    toward = np.abs(normals @ (LIGHT_DIRECTION / np.linalg.norm(LIGHT_DIRECTION)))
+    return np.asarray(darkest + (brightest - darkest) * toward)
+
+
+def _smooth_polygons(character: Character) -> BoolArray:
+    """(p,) whether each of a character's polygons is shaded smooth."""
+    return np.concatenate([read_bools(obj.data.polygons, "use_smooth") for obj in character.objects])
 
 
 def _unit(vectors: FloatArray) -> FloatArray:

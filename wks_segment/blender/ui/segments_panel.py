@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 
 from ...core.message import Message
+from ..workflow.live_session import session_of
 from .color_icons import color_icons_of
 from .main_panel import SubPanel
 from .messages import in_panel
@@ -107,7 +108,9 @@ class WKS_SEGMENT_PT_segments(SubPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         settings, layout = context.scene.wks_segment, self.layout
+        previewed = session_of(context).proposed is not None
         row = layout.row()
+        row.active = not previewed
         row.template_list(
             WKS_SEGMENT_UL_segments.__name__, "", settings, "segments", settings, "active_segment", rows=ROWS
         )
@@ -129,8 +132,13 @@ class WKS_SEGMENT_PT_segments(SubPanel, bpy.types.Panel):
             others.enabled = len(settings.segments) > 1
             others.menu("WKS_SEGMENT_MT_merge", text=in_panel("Merge Into"))
             row.operator("wks_segment.split_segment", text=in_panel("Split"))
-        text = Message("{count:,} faces by hand", count=settings.faces_by_hand) if settings.faces_by_hand else ""
-        layout.label(text=in_panel(text), icon="VIEW_PAN" if text else "NONE")
+        if previewed:
+            layout.label(text=in_panel("These are the written segments"), icon="INFO")
+        elif settings.faces_by_hand:
+            text = Message("{count:,} faces by hand", count=settings.faces_by_hand)
+            layout.label(text=in_panel(text), icon="VIEW_PAN")
+        else:
+            layout.label(text="")
 
 
 CLASSES = (

@@ -13,6 +13,7 @@ from ..workflow.background_job import BackgroundJob, job_holder
 from ..workflow.live_session import ASLEEP, session_of
 from .messages import in_panel
 
+PREVIEW = "Preview in the viewport only: Accept writes it, and the list follows"
 NO_SEGMENTS = "No segments yet: learn a model, or apply one"
 
 
@@ -22,7 +23,7 @@ def status(context: bpy.types.Context) -> str:
     if session.message or job_holder(context).message:
         return session.message or job_holder(context).message
     if session.proposed is not None:
-        return "Preview: nothing is written before you press Accept"
+        return PREVIEW
     if settings.live and session.can_update(context.scene):
         if session.is_slow:
             return Message("Segments take {seconds:.0f} seconds here, too long for Live", seconds=session.seconds)
@@ -43,6 +44,8 @@ def whose_segments(context: bpy.types.Context) -> str:
         return Message('"{object}": segments transferred from another object', object=subject.name)
     if row is None:
         return Message('"{object}": segments without a model', object=subject.name)
+    if row.name == subject.name:
+        return Message('"{object}": segments of the model of this name', object=subject.name)
     return Message('"{object}": segments of the model "{name}"', object=subject.name, name=row.name)
 
 

@@ -308,6 +308,7 @@ def write_outputs(
     if weights is None and request.outputs.vertex_groups == "soft":
         report.warn("The vertex groups are hard: only a model gives the probabilities of soft ones (Apply to Selected)")
     names: dict[str, int] = {}
+    merged: set[tuple[str, int]] = set()
     not_taken_back: list[str] = []
     with report.stage("write"):
         if origin is not None:
@@ -324,10 +325,11 @@ def write_outputs(
                 written = write_labels(obj.data, parts[polygons], options, notes.joined, own, not_taken_back)
                 enter_origin(obj.data, from_)
                 names |= {style.name_of(part): part for part in part_ids.unique_parts(written)}
+                given = set(np.unique(parts[polygons]).tolist())
+                merged |= {(from_.labels, part) for part in given & notes.joined.keys()}
         segment_list.fill(settings)
     report.warn(*not_taken_back)
-    in_order = part_ids.unique_parts(np.array(list(names.values()), dtype=np.int64))
-    report.parts = {name: part for part in in_order for name, number in names.items() if number == part}
+    report.add_written(names, len(merged))
 
 
 def options_of(settings: WKSSegmentSettings) -> OutputOptions:
@@ -356,7 +358,7 @@ def rewrite_outputs(settings: WKSSegmentSettings, mesh: bpy.types.Mesh, warnings
 def stored_model(settings: WKSSegmentSettings) -> core.PoseSegmentation:
     """The model that was learned in or loaded into this scene; UserError if there is none."""
     if not settings.model:
-        raise UserError("No model yet: learn one with Learn and Segment, or load one from a file")
+        raise UserError("No model yet: use Learn and Segment, or import a model")
     return model_library.from_text(settings.model)
 
 

@@ -34,7 +34,11 @@ class Report:
     laplacians
         For each pose, which triangles its spectrum is computed on.
     n_segments : int
-        Segments of the model, or those that occur on the poses, once labeled.
+        Segments of the model; those that it found on the poses, once labeled; those that the list shows, once written.
+    n_found : int
+        Segments that the model found on the poses, before the user's merges.
+    n_merged : int
+        Parts among them that are merged into others, because the user did so before.
     parts
         Number of each part that occurs, by name.
     certainty
@@ -56,6 +60,8 @@ class Report:
     poses: list[Pose]
     laplacians: list[str] = field(default_factory=list)
     n_segments: int = 0
+    n_found: int = 0
+    n_merged: int = 0
     parts: dict[str, int] = field(default_factory=dict)
     certainty: dict[int, float] | None = None
     seconds: dict[str, float] = field(default_factory=dict)
@@ -71,10 +77,17 @@ class Report:
         self.curve = certainty_lines(model)
 
     def add_labels(self, labels: IntArray) -> None:
-        """Record which parts occur among labels."""
+        """Record which parts occur among labels of a model."""
         occurring = part_ids.unique_parts(labels)
-        self.n_segments = len(np.unique(part_ids.segments_of(np.array(occurring))))
-        self.parts = {part_ids.default_name(part): part for part in occurring}
+        self.add_written({part_ids.default_name(part): part for part in occurring})
+        self.n_found = self.n_segments
+
+    def add_written(self, parts: dict[str, int], n_merged: int = 0) -> None:
+        """Record the written parts by name, with the user's changes, and how many of the model's are merged."""
+        in_order = part_ids.unique_parts(np.array(list(parts.values()), dtype=np.int64))
+        self.parts = {name: part for part in in_order for name, number in parts.items() if number == part}
+        self.n_segments = len(np.unique(part_ids.segments_of(np.array(in_order))))
+        self.n_merged = n_merged
 
     def warn(self, *texts: str) -> None:
         """Add warnings, unless they are there already."""
@@ -94,32 +107,41 @@ class Report:
 
     @property
     def facts(self) -> list[str]:
-        """Short facts for the user: poses, vertices, segments, improved triangles, seconds."""
+        """Short facts for the user: poses, vertices, segments, merges, improved triangles, seconds."""
         improved = self.laplacians.count("delaunay")
         return [
             Message("1 pose") if len(self.poses) == 1 else Message("{count} poses", count=len(self.poses)),
             Message("{count:,} vertices", count=sum(pose.mesh.n_vertices for pose in self.poses)),
             part_ids.count_text(self.n_segments, len(self.parts)),
+            *merged_facts(self.n_merged),
             *([Message("better triangles for {count}", count=improved)] if improved else []),
             Message("{seconds:.1f} seconds", seconds=sum(self.seconds.values())),
         ]
 
 
+def merged_facts(count: int) -> list[Message]:
+    """Fact that parts are merged into others, which is why there are fewer than the model has; none without merges."""
+    if count == 0:
+        return []
+    return [Message("1 merged into another") if count == 1 else Message("{count} merged into others", count=count)]
+
+
 def segment_warnings(model: core.PoseSegmentation, report: Report) -> list[str]:
     """Warning that segments of the model do not occur on any pose; none if all occur."""
-    lost = model.n_segments_ - report.n_segments
+    lost = model.n_segments_ - report.n_found
     if lost <= 0:
         return []
     return [
         Message(
-            "{lost} of {count} segments are gone: all of their parts were too small", lost=lost, count=model.n_segments_
+            "{lost} of {count} segments are gone: all of their regions are below Smallest Part",
+            lost=lost, count=model.n_segments_,
         )
-    ]
+    ]  # fmt: skip
 
 
 def absent_warnings(model: core.PoseSegmentation, report: Report) -> list[str]:
     """Warning that segments of an applied model do not occur on the objects; none if all occur."""
-    absent = model.n_segments_ - report.n_segments
+    absent = model.n_segments_ - report.n_found
     if absent <= 0:
         return []
     return [

@@ -9,6 +9,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
+from ...core.message import Message
 from ...core.user_labels import LONGEST_NAME
 from ..outputs.color_attribute import recolor_faces
 from ..outputs.labels import rewrite_labels
@@ -143,6 +144,12 @@ def active_part(settings: WKSSegmentSettings) -> int | None:
     """Number of the active part in the list; None if the list is empty."""
     index = settings.active_segment
     return settings.segments[index].number if index < len(settings.segments) else None
+
+
+def count_of(settings: WKSSegmentSettings) -> Message:
+    """Text with the number of segments in the list, and of parts if they have sides."""
+    numbers = np.array([item.number for item in settings.segments])
+    return part_ids.count_text(len(np.unique(part_ids.segments_of(numbers))), len(numbers))
 
 
 def active_labels(settings: WKSSegmentSettings) -> str:

@@ -49,7 +49,7 @@ GERMAN_FILE_MESSAGES = {
     "the number of a part": "die Nummer eines Teils",
     # Other files.
     "{path}: Blender cannot read it: {reason}": "{path}: Blender kann sie nicht lesen: {reason}",
-    "{path}: the folder {folder} is not writable: take another one, or ask whom it belongs to": "{path}: in den Ordner {folder} darf nicht geschrieben werden: nimm einen anderen, oder frage, wem er gehört",
+    "{path}: the folder {folder} is not writable: take another one, or ask whom it belongs to": "{path}: in den Ordner {folder} darf nicht geschrieben werden: einen anderen nehmen oder fragen, wem er gehört",
     "{path}: it could not be written: {reason}": "{path}: sie konnte nicht geschrieben werden: {reason}",
     "{path}: the folder {folder} does not exist": "{path}: den Ordner {folder} gibt es nicht",
     "{path}: this is a folder, give the name of a file": "{path}: das ist ein Ordner, den Namen einer Datei angeben",
