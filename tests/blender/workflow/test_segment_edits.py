@@ -162,9 +162,10 @@ def test_faces_by_hand_last_until_forgotten(settings):
     objects = limbed_poses(0.0, 0.4)
     select(*objects)
     OPS.learn()
+    select(objects[0])
+    OPS.apply()  # alone, as below: the labels of both poses together differ in a few faces
     model = labels_of(objects[0])
     chosen = np.arange(len(model)) < 50
-    select(objects[0])
     target = settings.segments[-1].number
     activate(settings, target)
     choose(objects[0], chosen)
