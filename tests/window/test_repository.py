@@ -4,6 +4,7 @@ No window is opened. An update must keep the user's models, names, settings, pre
 """
 
 import functools
+import os
 import re
 import shutil
 import subprocess
@@ -55,6 +56,8 @@ def served(tmp_path):
 @pytest.fixture(scope="session")
 def old_zip(tmp_path_factory):
     """The extension as it was in version 0.1.0, or in a shallow clone today's with that number."""
+    if "WKS_SEGMENT_WINDOW" not in os.environ:  # fixtures of the session come before those that skip
+        pytest.skip("needs a real Blender")
     source = tmp_path_factory.mktemp("old")
     archive = subprocess.run(["git", "archive", LAST_OF_OLD], cwd=ROOT, capture_output=True, check=False)
     if archive.returncode == 0:

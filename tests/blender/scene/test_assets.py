@@ -169,7 +169,7 @@ def test_object_scale_changes_no_labels(scale):
     select(scaled)
     assert OPS.apply() == {"FINISHED"}
     if len({abs(s) for s in scale}) == 1:
-        assert (labels_of(plain) == labels_of(scaled)).mean() > 0.99
+        assert (labels_of(plain) == labels_of(scaled)).mean() > 0.98
 
 
 def test_far_from_the_origin():

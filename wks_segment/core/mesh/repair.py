@@ -5,8 +5,6 @@ The user's own mesh does not change. Both repairs depend on proportions only, so
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.sparse import csr_matrix, diags
 
@@ -74,52 +72,18 @@ def _neighbor_means(vertices: FloatArray, adjacency: csr_matrix, spiky: BoolArra
     return np.where(total > 0, (weights @ vertices) / np.maximum(total, 1), vertices)
 
 
-@dataclass(frozen=True)
-class Caps:
+def caps_of_small_holes(mesh: TriangleMesh) -> tuple[FloatArray, IntArray]:
     """Caps that close the small holes of a mesh, each of two rings of faces around the middle of the hole.
 
-    Attributes
-    ----------
-    rim : (r,) int array
-        The vertices on the border of a hole.
-    hole : (r,) int array
-        The hole of each of these: 0, 1, …
-    faces : (l, 3) int array
-        The faces to append to those of the mesh.
+    Returns
+    -------
+    (k, 3) array of vertices to append to those of the mesh, and (l, 3) int array of faces to append.
     """
-
-    rim: IntArray
-    hole: IntArray
-    faces: IntArray
-
-    @classmethod
-    def of_small_holes(cls, mesh: TriangleMesh) -> Caps:
-        """Caps of the holes whose perimeter is small beside their island."""
-        edges, _, count = unique_edges(mesh.faces)
-        border = edges[count == 1]
-        loop = connected_groups(border, mesh.n_vertices)
-        if len(border):
-            border = border[_is_small(mesh, border, loop)[loop[border[:, 0]]]]
-        rim = np.unique(border)
-        hole = np.unique(loop[rim], return_inverse=True)[1].ravel()
-        inner, center = np.zeros((2, mesh.n_vertices), dtype=np.int64)
-        inner[rim] = mesh.n_vertices + np.arange(len(rim))
-        center[rim] = mesh.n_vertices + len(rim) + hole
-        a, b = border.T
-        rings = [(a, b, inner[b]), (a, inner[b], inner[a]), (inner[a], inner[b], center[a])]
-        return cls(rim, hole, np.concatenate([np.stack(ring, axis=1) for ring in rings]))
-
-    def vertices(self, places: FloatArray) -> FloatArray:
-        """(k, d) places of the vertices to append: halfway between rim and middle, then the middles."""
-        if not len(self.rim):
-            return np.zeros((0, places.shape[1]))
-        sums = csr_matrix((np.ones(len(self.rim)), (self.hole, np.arange(len(self.rim)))))
-        middle = diags(1 / np.asarray(sums.sum(axis=1)).ravel()) @ sums @ places[self.rim]
-        return np.concatenate([(places[self.rim] + middle[self.hole]) / 2, middle])
-
-
-def _is_small(mesh: TriangleMesh, border: IntArray, loop: IntArray) -> BoolArray:
-    """Whether each loop of border edges is a small hole, given the (e, 2) border edges and the loop of each vertex."""
+    edges, _, count = unique_edges(mesh.faces)
+    border = edges[count == 1]
+    if not len(border):
+        return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
+    loop = connected_groups(border, mesh.n_vertices)
     # A loop is simple if each vertex has two border edges. Others branch, and it is not clear what the hole is there.
     n_border_edges = np.bincount(border.ravel(), minlength=mesh.n_vertices)
     simple = np.ones(loop.max() + 1, dtype=bool)
@@ -129,5 +93,19 @@ def _is_small(mesh: TriangleMesh, border: IntArray, loop: IntArray) -> BoolArray
     island_area = np.bincount(mesh.islands, weights=mesh.vertex_areas)
     island_of_loop = np.zeros(len(simple), dtype=np.int64)
     island_of_loop[loop] = mesh.islands
-    small: BoolArray = simple & (perimeter <= HOLE_PERIMETER * np.sqrt(island_area[island_of_loop])) & (perimeter > 0)
-    return small
+    small = simple & (perimeter <= HOLE_PERIMETER * np.sqrt(island_area[island_of_loop])) & (perimeter > 0)
+    border = border[small[loop[border[:, 0]]]]
+    if not len(border):
+        return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
+    rim = np.unique(border)
+    holes, hole = np.unique(loop[rim], return_inverse=True)
+    sums = csr_matrix((np.ones(len(rim)), (hole, np.arange(len(rim)))), shape=(len(holes), len(rim)))
+    middle = diags(1 / np.asarray(sums.sum(axis=1)).ravel()) @ sums @ mesh.vertices[rim]
+    halfway = (mesh.vertices[rim] + middle[hole]) / 2
+    inner = np.zeros(mesh.n_vertices, dtype=np.int64)
+    inner[rim] = mesh.n_vertices + np.arange(len(rim))
+    center = np.zeros(mesh.n_vertices, dtype=np.int64)
+    center[rim] = mesh.n_vertices + len(rim) + hole
+    a, b = border.T
+    caps = [(a, b, inner[b]), (a, inner[b], inner[a]), (inner[a], inner[b], center[a])]
+    return np.concatenate([halfway, middle]), np.concatenate([np.stack(cap, axis=1) for cap in caps])

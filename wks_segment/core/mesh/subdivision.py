@@ -15,36 +15,28 @@ MAX_HALVINGS = 20
 
 
 def split_long_edges(
-    places: FloatArray, faces: IntArray, longest: float, most_vertices: int
+    vertices: FloatArray, faces: IntArray, longest: float, most_vertices: int
 ) -> tuple[FloatArray, IntArray, IntArray]:
     """Halve edges until none is longer than `longest`, or the next round would exceed `most_vertices`.
 
-    Parameters
-    ----------
-    places : (n, d) array
-        Places of the vertices, of which the first three columns are the positions that lengths are measured in.
-    faces : (m, 3) int array
-    longest : float
-    most_vertices : int
-
     Returns
     -------
-    (n', d) places, the old ones first; (m', 3) faces; and (m',) index of the old face that contains each new one.
+    (n', 3) vertices, the old ones first; (m', 3) faces; and (m',) index of the old face that contains each new one.
     """
     parent = np.arange(len(faces))
     for _ in range(MAX_HALVINGS):
-        if edge_lengths(places[:, :3], faces).max() <= longest:
+        if edge_lengths(vertices, faces).max() <= longest:
             break
         edges, which, _ = unique_edges(faces)
-        too_long = np.linalg.norm(places[edges[:, 0], :3] - places[edges[:, 1], :3], axis=1) > longest
-        if len(places) + too_long.sum() > most_vertices:
+        too_long = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1) > longest
+        if len(vertices) + too_long.sum() > most_vertices:
             break
         middle = np.full(len(edges), -1)
-        middle[too_long] = len(places) + np.arange(too_long.sum())
-        places = np.concatenate([places, places[edges[too_long]].mean(axis=1)])
-        faces, old_face = split_faces(faces, middle[which.reshape(-1, 3)], places[:, :3])
+        middle[too_long] = len(vertices) + np.arange(too_long.sum())
+        vertices = np.concatenate([vertices, vertices[edges[too_long]].mean(axis=1)])
+        faces, old_face = split_faces(faces, middle[which.reshape(-1, 3)], vertices)
         parent = parent[old_face]
-    return places, faces, parent
+    return vertices, faces, parent
 
 
 def split_faces(faces: IntArray, middles: IntArray, vertices: FloatArray) -> tuple[IntArray, IntArray]:

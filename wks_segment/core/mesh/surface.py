@@ -21,7 +21,7 @@ from ..message import Message, message_of
 from .canonical import Frame, most_spread, order_of_faces, order_of_vertices
 from .islands import ties_between_islands
 from .mirror import Mirror, mirror_of
-from .repair import Caps, without_spikes
+from .repair import caps_of_small_holes, without_spikes
 from .subdivision import split_long_edges
 from .triangle_mesh import (
     BoolArray,
@@ -50,8 +50,6 @@ MOST_ISLANDS = {"joined": 1000, "separate": 100}
 LONGEST_EDGE = 1.4
 """Longest edge after refinement, in units of the square root of a vertex's area; edges of equilateral triangles measure
 1.07."""
-STRETCHED = 2.0
-"""Edges that have more than this times the longest edge in the pose itself are halved in any case."""
 MOST_NEW_VERTICES = 4
 """Most vertices that refinement adds, in units of `min_vertices`: thin triangles would need very many."""
 
@@ -156,9 +154,6 @@ class Connection:
         The faces in such an order.
     mirror : Mirror or None
         Mirror images of the faces at rest, or in the most symmetric pose; None if the mesh is not symmetric.
-    reference : (n, 3) array or None
-        The vertices at rest, or in the pose whose limbs are stretched out most: holes are closed and edges halved alike
-        in all poses, by their lengths there. None if the mesh is the only pose: by its own lengths.
 
     Examples
     --------
@@ -175,14 +170,12 @@ class Connection:
     vertices: IntArray
     faces: IntArray
     mirror: Mirror | None = None
-    reference: FloatArray | None = None
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Arrays by name, to tell whether two connections are the same."""
         mirror = {} if self.mirror is None else {"image": self.mirror.image, "side": self.mirror.side}
         order = {"vertices": self.vertices, "faces": self.faces}
-        reference = {} if self.reference is None else {"reference": self.reference}
-        return {"welded": self.welded, "kept": self.kept, "ties": self.ties, **order, **mirror, **reference}
+        return {"welded": self.welded, "kept": self.kept, "ties": self.ties, **order, **mirror}
 
 
 def connect(*poses: TriangleMesh, rest: TriangleMesh | None = None, pieces: IslandMode = "joined") -> Connection:
@@ -228,8 +221,7 @@ def connect(*poses: TriangleMesh, rest: TriangleMesh | None = None, pieces: Isla
         places = [pose.vertices[vertex_order] for pose in (poses if rest is None else [rest])]
         ties = vertex_order[ties_between_islands(number[faces[in_order]], *places)]
     mirror = mirror_of(poses if rest is None else [rest])
-    reference = None if rest is None and len(poses) == 1 else at_rest.vertices
-    return Connection(welded, kept, ties, vertex_order, face_order, mirror, reference)
+    return Connection(welded, kept, ties, vertex_order, face_order, mirror)
 
 
 def connect_alike(
@@ -294,22 +286,14 @@ def prepare_surface(
         vertex_of[outside] = cKDTree(vertices).query(mesh.vertices[outside])[1]
 
     surface = TriangleMesh(without_spikes(vertices, faces), faces)
-    reference = surface
-    if connection.reference is not None:
-        reference = TriangleMesh(without_spikes(connection.reference[used], faces), faces)
-    caps = Caps.of_small_holes(reference)
-    places = np.concatenate([reference.vertices, surface.vertices], axis=1)
-    places, faces = np.concatenate([places, caps.vertices(places)]), np.concatenate([faces, caps.faces])
-    face_of = np.append(face_of, np.full(len(caps.faces), -1))
+    cap_vertices, caps = caps_of_small_holes(surface)
+    vertices, faces = np.concatenate([surface.vertices, cap_vertices]), np.concatenate([faces, caps])
+    face_of = np.append(face_of, np.full(len(caps), -1))
     if min_vertices:
-        most_vertices = len(places) + MOST_NEW_VERTICES * min_vertices
-        longest = LONGEST_EDGE * np.sqrt(reference.area / min_vertices)
-        places, faces, parent = split_long_edges(places, faces, longest, most_vertices)
-        face_of, longest = face_of[parent], STRETCHED * LONGEST_EDGE * np.sqrt(surface.area / min_vertices)
-        of_pose_first = np.roll(places, 3, axis=1)
-        of_pose_first, faces, parent = split_long_edges(of_pose_first, faces, longest, most_vertices)
-        face_of, places = face_of[parent], np.roll(of_pose_first, 3, axis=1)
-    vertices = places[:, 3:]
+        longest = LONGEST_EDGE * np.sqrt(surface.area / min_vertices)
+        most_vertices = len(vertices) + MOST_NEW_VERTICES * min_vertices
+        vertices, faces, parent = split_long_edges(vertices, faces, longest, most_vertices)
+        face_of = face_of[parent]
     # Caps and refinement append vertices, so the numbers in the ties stay valid.
     ties = compact[connection.ties]
     if len(vertices) > surface.n_vertices or len(ties):
