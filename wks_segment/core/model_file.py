@@ -35,7 +35,6 @@ from .learning.standardizer import LEAST_SPREAD, Standardizer
 from .learning.taught_parts import MOST_TAUGHT, TaughtParts
 from .mesh.triangle_mesh import FloatArray, IntArray
 from .message import Message, message_of
-from .parts.kind_traits import KindTraits
 from .user_labels import PartNotes
 
 FORMAT = "wks_segment model"
@@ -107,7 +106,7 @@ class ModelContent:
 
 def encode(model: ModelContent) -> str:
     """JSON text of a model."""
-    mixture, grouping, traits = model.learned.mixture, model.learned.grouping, model.learned.traits
+    mixture, grouping = model.learned.mixture, model.learned.grouping
     arrays: dict[str, FloatArray | IntArray] = {
         "centre": model.standardizer.mean, "spread": model.standardizer.spread, "weights": mixture.weights,
         "means": mixture.means, "covariances": mixture.covariances, "usual_scores": model.usual_scores,
@@ -121,8 +120,8 @@ def encode(model: ModelContent) -> str:
         arrays |= {name: getattr(grouping, name) for name in ("certainties", "by_chance", "likeness")}
         if grouping.areas is not None:
             arrays["areas"] = grouping.areas
-    if traits is not None:
-        arrays |= {f"kind_{name}": array for name, array in vars(traits).items()}
+    if model.learned.of_bodies:
+        arrays["of_bodies"] = np.array(1)
     taught = model.learned.taught
     if taught is not None:
         arrays |= taught.arrays()
@@ -179,12 +178,11 @@ def _decoded(content: dict[str, Any]) -> ModelContent:
         part_notes = PartNotes.of_json(content)
     except ValueError as error:
         raise DamagedError(message_of(error)) from error
-    grouping, traits, taught, atlases = None, None, None, None
+    grouping, of_bodies, taught, atlases = None, False, None, None
     if grouped:
         grouping = _grouping(arrays)
         taught = TaughtParts.of_arrays(arrays)
-        if "kind_mean" in arrays:
-            traits = KindTraits(*(arrays[f"kind_{name}"] for name in KindTraits.__dataclass_fields__))
+        of_bodies = "of_bodies" in arrays or "kind_mean" in arrays
         wholes, segments = (RegionAtlas.of_arrays(arrays, kind) for kind in REGION_KINDS)
         atlases = wholes, segments
     return ModelContent(
@@ -192,7 +190,7 @@ def _decoded(content: dict[str, Any]) -> ModelContent:
         PartMixture(
             GaussianMixture(covariance_type, arrays["weights"], arrays["means"], arrays["covariances"]),
             grouping,
-            traits,
+            of_bodies,
             taught,
         ),
         Standardizer(effective(parameters, "scaling"), arrays["centre"], arrays["spread"]),
@@ -249,7 +247,9 @@ def _fields(
         )
         if "areas" in content:
             yield Field("areas", (k,), least=0.0, most=1.0)
-        if "kind_mean" in content:
+        if "of_bodies" in content:
+            yield Field("of_bodies", (), 1, 1, whole=True)
+        if "kind_mean" in content:  # sizes and neighbors of kinds, which files had before, and which are in the digest
             yield from (
                 Field("kind_mean", (n_kinds,)),
                 Field("kind_spread", (n_kinds,), least=LEAST_SPREAD),

@@ -93,9 +93,8 @@ class PoseSegmentation(PoseLabeling, Estimator):
     grouping_ : MergeTree or None
         Order in which components are merged into kinds of parts, and these into segments; None with the paper's
         setting.
-    kind_traits_ : KindTraits or None
-        Sizes of the parts of each kind, and which kinds touch, if several meshes were learned: a mesh is then cut by
-        its own shape, and each of its parts gets one kind. Otherwise None.
+    of_bodies_ : bool
+        Whether several meshes were learned: a mesh is then cut by its own shape, and each of its regions gets one kind.
     taught_ : TaughtParts or None
         Which segments are taught parts, if `fit` was given labels: the first `taught_.n_parts` ones.
     regions_ : RegionAtlas or None
@@ -358,7 +357,7 @@ class PoseSegmentation(PoseLabeling, Estimator):
 
     def _learned(self) -> PartMixture:
         """What was learned of the parts; NotFittedError if nothing was."""
-        return PartMixture(self._fitted(), self.grouping_, self.kind_traits_, self.taught_)
+        return PartMixture(self._fitted(), self.grouping_, self.of_bodies_, self.taught_)
 
     def _set_learned(
         self,
@@ -368,7 +367,7 @@ class PoseSegmentation(PoseLabeling, Estimator):
         scores: FloatArray,
     ) -> None:
         self.mixture_, self.standardizer_ = learned.mixture, standardizer
-        self.grouping_, self.kind_traits_, self.taught_ = learned.grouping, learned.traits, learned.taught
+        self.grouping_, self.of_bodies_, self.taught_ = learned.grouping, learned.of_bodies, learned.taught
         self.regions_, self.sides_ = atlases or (None, None)
         self.usual_scores_ = scores
 

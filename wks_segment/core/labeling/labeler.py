@@ -19,7 +19,6 @@ from ..learning.standardizer import Standardizer
 from ..learning.taught_parts import TaughtParts
 from ..mesh.adjacency import FaceAdjacency
 from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
-from ..parts.kind_traits import KindTraits
 from ..poses.pose_cache import Kind, ResultKey, Workpiece, smooth_means
 from ..poses.pose_signature import PoseSignature, of_one_mesh
 from ..progress import Progress
@@ -65,8 +64,8 @@ class Labeler:
     n_segments : int
     length : float
         Smoothing length in units of the square root of the area; 0: no smoothing.
-    traits : KindTraits or None
-        Of the kinds of parts, if the model is of several meshes: a mesh is then cut by its own shape.
+    of_bodies : bool
+        Whether the kinds are those of several meshes: a mesh is then cut by its own shape.
     taught : TaughtParts or None
         Which of the first segments are taught parts, or two of them, which differ by their side.
     sides_atlas : RegionAtlas or None
@@ -78,7 +77,7 @@ class Labeler:
     grouping: MergeTree | None
     n_segments: int
     length: float
-    traits: KindTraits | None = None
+    of_bodies: bool = False
     taught: TaughtParts | None = None
     sides_atlas: RegionAtlas | None = None
 
@@ -178,7 +177,7 @@ class Labeler:
         grouping = self.grouping
         assert grouping is not None
         # Own parts of a body are whole as they are: what they have in common is for segments only.
-        n_wholes = grouping.number_of_wholes(self.n_segments) if self.traits is None else grouping.n_kinds
+        n_wholes = grouping.n_kinds if self.of_bodies else grouping.number_of_wholes(self.n_segments)
         numbers = n_wholes, self.n_segments
         atlases = {atlas.n_groups: atlas for atlas in known}
         for n_groups, step in progress.each(sorted(set(numbers) - atlases.keys())):
@@ -255,7 +254,7 @@ class Labeler:
         def compute() -> Regions:
             mesh = self._polygon_mesh(poses, None)
             cleaning = Cleaning(CutStyle(self.length, REGION_CREASE, REGION_WIDTH), min_share)
-            if self.traits is None or self.grouping is None or self.length == 0:
+            if not self.of_bodies or self.grouping is None or self.length == 0:
                 posteriors, group = self._mean_posteriors(mesh, poses, False, n_groups, progress), np.arange(n_groups)
             else:
                 own = self._own_parts(poses, progress)
@@ -294,7 +293,7 @@ class Labeler:
         So they do for parts of one mesh that nobody named, and for parts taught on several bodies, not on one.
         """
         grouping = self.grouping
-        do_not_count = self.traits is not None if self.taught is None else not self.taught.of_bodies
+        do_not_count = self.of_bodies if self.taught is None else not self.taught.of_bodies
         if grouping is None or grouping.areas is None or do_not_count or self.length == 0:
             return posteriors
         n_groups = posteriors.shape[1]
@@ -309,14 +308,14 @@ class Labeler:
         self, poses: Sequence[Workpiece], n_groups: int, progress: Progress
     ) -> Callable[[Workpiece], FloatArray]:
         """Function that gives the (m, n_groups) posteriors on the faces of one of the poses of a mesh."""
-        if self.traits is None or self.length == 0:
+        if not self.of_bodies or self.length == 0:
             smooth = self._smooth(poses, n_groups)
             return lambda pose: pose.surface.to_faces(smooth(pose))
         together = poses if of_one_mesh(_pose_signatures(poses)) else None
 
         def on_faces(pose: Workpiece) -> FloatArray:
             own = self._own_parts(together or [pose], progress)
-            return self._merged(own.posteriors, n_groups)[own.part]
+            return self._merged(own.posteriors, n_groups)[own.region]
 
         return on_faces
 
@@ -327,18 +326,18 @@ class Labeler:
     def _own_parts(self, poses: Sequence[Workpiece], progress: Progress) -> OwnParts:
         """Parts of a mesh, in some poses, that is cut by its own shape."""
         assert self.grouping is not None
-        assert self.traits is not None
-        traits, group = self.traits, self.grouping.groups(self.grouping.n_kinds)
+        n_kinds = self.grouping.n_kinds
+        group = self.grouping.groups(n_kinds)
 
         def log_likelihoods(pose: Workpiece) -> FloatArray:
             samples = self.standardizer.transform(pose.signature)
-            return self.mixture.group_log_likelihoods(samples, group, len(traits.mean))
+            return self.mixture.group_log_likelihoods(samples, group, n_kinds)
 
         inputs = self.mixture, self.grouping, *_pose_signatures(poses)
         return poses[0].results.get(
             ResultKey(Kind.OWN_PARTS, len(poses)),
             inputs,
-            lambda: own_parts(poses, log_likelihoods, traits, progress),
+            lambda: own_parts(poses, log_likelihoods, n_kinds, progress),
         )
 
     def _keeps(self, count: int) -> bool:

@@ -15,7 +15,6 @@ from ..learning.taught_parts import TaughtParts
 from ..mesh.adjacency import connected_regions
 from ..mesh.triangle_mesh import FloatArray, IntArray
 from ..message import Message
-from ..parts.kind_traits import KindTraits
 from ..poses.arguments import as_list
 from ..poses.describe import PoseDescriber
 from ..poses.pose_cache import AnyPose, Workpiece
@@ -37,7 +36,7 @@ class PoseLabeling(PoseDescriber):
     mixture_: GaussianMixture
     standardizer_: Standardizer
     grouping_: MergeTree | None
-    kind_traits_: KindTraits | None
+    of_bodies_: bool
     taught_: TaughtParts | None
     regions_: RegionAtlas | None
     sides_: RegionAtlas | None
@@ -217,7 +216,7 @@ class PoseLabeling(PoseDescriber):
     def _labeler(self) -> Labeler:
         """Labeler with the learned mixture and the current settings."""
         mixture = self._fitted()
-        learned = PartMixture(mixture, self.grouping_, self.kind_traits_, self.taught_)
+        learned = PartMixture(mixture, self.grouping_, self.of_bodies_, self.taught_)
         return self._labeler_of(learned, self.standardizer_, self.sides_)
 
     def _labeler_of(
@@ -227,7 +226,7 @@ class PoseLabeling(PoseDescriber):
         of_mesh = taught is not None and not taught.of_bodies
         length = float(self._effective("smoothness") * (TAUGHT_LENGTH if of_mesh else SMOOTHING_LENGTH))
         n_groups = self._number_of_segments(mixture, grouping, taught)
-        return Labeler(mixture, standardizer, grouping, n_groups, length, learned.traits, taught, sides)
+        return Labeler(mixture, standardizer, grouping, n_groups, length, learned.of_bodies, taught, sides)
 
     def _number_of_segments(
         self, mixture: GaussianMixture, grouping: MergeTree | None, taught: TaughtParts | None

@@ -47,7 +47,7 @@ def recognized_parts(
         atlases = labeler.atlases(poses, rest, progress.part(0.0, FIRST_ROUND, "regions"))
         progress = progress.part(FIRST_ROUND, 1.0)
         lost = sorted(set(range(labeler.n_segments)) - set(atlases[1].traits.segment.tolist()))
-        if not lost or learned.traits is not None or round_ == MERGING_ROUNDS - 1:
+        if not lost or learned.of_bodies or round_ == MERGING_ROUNDS - 1:
             break  # the tree that is returned is the one that the atlases are of
         learned = replace(learned, grouping=learned.grouping.without(lost[-1], labeler.n_segments))
     return learned, atlases

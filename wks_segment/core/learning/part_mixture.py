@@ -10,53 +10,44 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..mesh.surface import shares_at_vertices
-from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray, TriangleMesh
+from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
 from ..message import Message, message_of
 from ..parts.evidence import Evidence
-from ..parts.kind_traits import KindTraits
 from ..parts.kinds import Kinds, find_kinds, n_kinds_of_bodies, n_regions_of_mesh
+from ..parts.part_graph import PartGraph
 from ..poses.pose_cache import Workpiece, smooth_means
 from ..poses.pose_signature import of_one_mesh
 from ..poses.signature_cache import Cache, content_key
 from ..progress import Progress
-from .gaussian_mixture import (
-    CovarianceType,
-    GaussianMixture,
-    TooFewSamplesError,
-    fit_mixture,
-    maximize,
-    squares_of,
-    variance_floor,
-)
-from .k_means import k_means
+from .agreement import PER_KIND, agreed_kinds
+from .gaussian_mixture import GaussianMixture, TooFewSamplesError, fit_mixture
+from .inside_parts import fitted_inside
 from .merge_tree import MergeTree
 from .parameters import effective, least_segments
 from .standardizer import Standardizer
 from .taught_parts import TaughtParts
 from .training_samples import TrainingSamples
 
-KINDS_VERSION = 6
+KINDS_VERSION = 7
 """To be raised whenever the same poses and settings give other kinds than before."""
 AXES, WHITENING, LEAST_VARIANCE = 20, 0.25, 1e-2
 """Number of principal axes of the signatures along which parts are compared, and the power of their variance, with a
 little added, that they are divided by: later axes, which tell small parts apart, then count more, but less than the
 first ones."""
-COMPONENTS_OF_MESH, COMPONENTS_OF_POSE, COMPONENTS_OF_BODIES, PER_SEGMENT = 100, 40, 60, 2
-"""Number of components of the mixture of one mesh, but at most so many for each of its poses; of the mixture of several
-meshes; and the least number for each segment. With
-more, poses and bodies that were not learned are recognized worse, with fewer, parts are not kept
+COMPONENTS_OF_MESH, COMPONENTS_OF_POSE, PER_SEGMENT = 100, 40, 2
+"""Number of components of the mixture of one mesh, but at most so many for each of its poses; and the least number for
+each segment. With more, poses that were not learned are recognized worse, with fewer, parts are not kept
 (docs/dev/experiments.md)."""
 SMOOTHING_LENGTH = 0.03
 """Width of the smoothing along borders at smoothness 1, in units of the square root of the area."""
 VANISHED = 0.5
 """A kind that keeps less than this share of its area when borders move is merged before all others."""
-K_MEANS_ROUNDS = 10
-"""Most rounds of k-means: later ones move places between clusters of one kind, and carry noise on."""
 FOUND = 0.63
 """Share of the time of finding parts and fitting the mixture after which the kinds are found."""
 
@@ -71,15 +62,15 @@ class PartMixture:
     grouping : MergeTree or None
         Order in which its components are merged into kinds of parts, and these into segments; None with the paper's
         setting.
-    traits : KindTraits or None
-        Of the kinds, in the order of the groups that these are, if several meshes were learned.
+    of_bodies : bool
+        Whether kinds are those of several meshes: another mesh is then cut by its own shape, and its regions get kinds.
     taught : TaughtParts or None
         The first groups as parts that a user taught, if any.
     """
 
     mixture: GaussianMixture
     grouping: MergeTree | None
-    traits: KindTraits | None
+    of_bodies: bool = False
     taught: TaughtParts | None = None
 
     def for_ranking(self, mixture: GaussianMixture) -> GaussianMixture:
@@ -130,15 +121,15 @@ def learn_parts(
     if parameters["preset"] == "paper":
         step, seed = progress.part(0.0, 1.0, "mixture"), parameters["random_state"]
         samples, shares = training.standardized, training.shares
-        return PartMixture(fit_mixture(samples, shares, n_segments, covariance_type, seed, step), None, None)
+        return PartMixture(fit_mixture(samples, shares, n_segments, covariance_type, seed, step), None)
     alone = len(poses) == 1 or of_one_mesh([pose.pose for pose in poses])
     meshes = [poses] if alone else [[pose] for pose in poses]
     axes = principal_axes(training)
     step = progress.part(0.0, FOUND, "parts")
-    kinds, were_known = kinds_of(meshes, training.standardizer, axes, n_segments, rest, cache, step)
+    kinds, were_known = kinds_of(meshes, training, axes, n_segments, rest, cache, step)
     if covariance_type == "auto":
-        covariance_type = "tied" if alone else "shared"
-    usual = min(COMPONENTS_OF_MESH, COMPONENTS_OF_POSE * len(poses)) if alone else COMPONENTS_OF_BODIES
+        covariance_type = "tied" if alone else "diag"
+    usual = min(COMPONENTS_OF_MESH, COMPONENTS_OF_POSE * len(poses)) if alone else PER_KIND * kinds.count
     count = max(usual, PER_SEGMENT * n_segments)
     step = progress.part(0.0 if were_known else FOUND, 1.0, "mixture")
     kind_of_samples = _kinds_of_samples(kinds.of_faces, meshes, training, kinds.count)
@@ -159,9 +150,7 @@ def learn_parts(
     kinds = _with_vanished_first(kinds, found, after)
     areas = training.shares @ of_components
     tree = MergeTree.of(mixture.means @ axes, mixture.weights, areas, kind, kinds, overlaps)
-    kind_of_groups = np.zeros(tree.n_kinds, dtype=np.int64)
-    kind_of_groups[tree.groups(tree.n_kinds)] = kind
-    return PartMixture(mixture, tree, None if kinds.traits is None else kinds.traits.of_kinds(kind_of_groups))
+    return PartMixture(mixture, tree, not alone)
 
 
 def principal_axes(training: TrainingSamples) -> FloatArray:
@@ -174,7 +163,7 @@ def principal_axes(training: TrainingSamples) -> FloatArray:
 
 def kinds_of(
     meshes: Sequence[Sequence[Workpiece]],
-    standardizer: Standardizer,
+    training: TrainingSamples,
     axes: FloatArray,
     n_segments: int,
     rest: TriangleMesh | None,
@@ -185,7 +174,7 @@ def kinds_of(
     key = ""
     if cache is not None:
         n_kinds = n_kinds_of_bodies(n_segments) if len(meshes) > 1 else None
-        settings = standardizer.scaling, n_regions_of_mesh(n_segments), n_kinds
+        settings = training.standardizer.scaling, n_regions_of_mesh(n_segments), n_kinds
         description = ("kinds", KINDS_VERSION, [len(of_mesh) for of_mesh in meshes], settings, rest is None)
         at_rest = {} if rest is None else rest.arrays()
         key = content_key(description, at_rest, *(pose.pose.arrays() for of_mesh in meshes for pose in of_mesh))
@@ -196,10 +185,12 @@ def kinds_of(
     for i, (of_mesh, step) in enumerate(progress.part(0.0, 0.5).each(meshes)):
         evidence.append(Evidence.of(of_mesh, rest if i == 0 else None, step, cache))
         in_poses = [
-            pose.surface.to_faces(standardizer.transform(pose.signature, np.float64) @ axes) for pose in of_mesh
+            pose.surface.to_faces(training.standardizer.transform(pose.signature, np.float64) @ axes)
+            for pose in of_mesh
         ]
         projected.append(np.mean(in_poses, axis=0))
-    kinds = find_kinds(evidence, projected, n_segments, progress.part(0.5, 1.0))
+    agree = partial(_agreed, meshes=meshes, training=training, axes=axes, least=n_segments)
+    kinds = find_kinds(evidence, projected, n_segments, progress.part(0.5, 1.0), agree)
     if cache is not None:
         try:
             cache.keep(key, kinds.arrays())
@@ -208,6 +199,21 @@ def kinds_of(
                 Message("parts were not kept for the next time: {reason}", reason=message_of(error)), stacklevel=3
             )
     return kinds, False
+
+
+def _agreed(
+    graphs: Sequence[PartGraph],
+    kinds: Sequence[IntArray],
+    meshes: Sequence[Sequence[Workpiece]],
+    training: TrainingSamples,
+    axes: FloatArray,
+    least: int,
+) -> list[IntArray]:
+    """See `AgreeFunction`."""
+    of_faces = [np.searchsorted(graph.regions, graph.region_of_faces()) for graph in graphs]
+    region = _kinds_of_samples(of_faces, meshes, training, max(len(graph.regions) for graph in graphs))
+    of_meshes = [region[training.pose == i] for i in range(len(graphs))]
+    return agreed_kinds(kinds, [graph.ties() for graph in graphs], of_meshes, training, axes, least)
 
 
 def _kinds_of_samples(
@@ -224,75 +230,6 @@ def _kinds_of_samples(
         here = training.pose == i
         kind_of_samples[here] = of_pose[training.vertex[here]]
     return kind_of_samples
-
-
-def fitted_inside(
-    training: TrainingSamples, kind_of_samples: IntArray, axes: FloatArray, count: int, covariance_type: CovarianceType
-) -> tuple[GaussianMixture, IntArray]:
-    """Mixture of about `count` components, each the samples of a cluster inside one kind; and (K,) their kinds.
-
-    Larger kinds have more clusters, by the square root of their area. With full matrices each kind has one.
-    """
-    places, shares = training.standardized @ axes, training.shares
-    present = np.unique(kind_of_samples)
-    sizes = np.sqrt([shares[kind_of_samples == k].sum() for k in present])
-    cluster = np.empty(len(places), dtype=np.int64)
-    kinds: list[int] = []
-    for k, size in zip(present, sizes, strict=True):
-        members = np.flatnonzero(kind_of_samples == k)
-        wanted = 1 if covariance_type == "full" else max(1, round(count * size / sizes.sum()))
-        inside = _clusters(places[members], shares[members], wanted)
-        cluster[members] = len(kinds) + inside
-        kinds += [int(k)] * (int(inside.max()) + 1)
-    masses = np.zeros((len(places), len(kinds)))
-    masses[np.arange(len(places)), cluster] = shares
-    samples = training.standardized
-    floor = variance_floor(samples, shares)
-    return maximize(samples, squares_of(samples, covariance_type), masses, covariance_type, floor), np.array(kinds)
-
-
-def _clusters(places: FloatArray, shares: FloatArray, count: int) -> IntArray:
-    """(n,) cluster of each place by k-means: 0, 1, …; fewer than `count` if there are fewer distinct places."""
-    if count == 1 or len(places) <= 1:
-        return np.zeros(len(places), dtype=np.int64)
-    halves = _halves(places, shares, count)
-    starts = np.array(
-        [np.average(places[halves == i], axis=0, weights=shares[halves == i]) for i in range(halves.max() + 1)]
-    )
-    found = k_means(places, shares, starts, K_MEANS_ROUNDS)
-    return np.unique(found, return_inverse=True)[1].ravel()
-
-
-def _halves(places: FloatArray, shares: FloatArray, count: int) -> IntArray:
-    """(n,) cluster of each place: the widest one is halved, across its longest axis, until there are `count`.
-
-    From these k-means ends alike after a little noise, which it does not from random places.
-    """
-    cluster = np.zeros(len(places), dtype=np.int64)
-    width, far = _across_longest_axis(places, shares)
-    widths, halves = [width], [far]
-    while len(widths) < count:
-        widest = int(np.argmax(widths))
-        far = halves[widest]
-        if not far.any():
-            break
-        members = np.flatnonzero(cluster == widest)
-        cluster[members[far]] = len(widths)
-        widths[widest], halves[widest] = _across_longest_axis(places[members[~far]], shares[members[~far]])
-        width, far = _across_longest_axis(places[members[far]], shares[members[far]])
-        widths.append(width)
-        halves.append(far)
-    return cluster
-
-
-def _across_longest_axis(places: FloatArray, shares: FloatArray) -> tuple[float, BoolArray]:
-    """Sum of squares of places along their longest axis, and (n,) which lie in its far half; none if all are equal."""
-    offset = places - np.average(places, axis=0, weights=shares)
-    squares, axes = np.linalg.eigh((offset * shares[:, None]).T @ offset)
-    along = offset @ axes[:, -1]
-    # A direction that does not depend on the library's choice of sign.
-    far = along * (-1 if shares @ along**3 < 0 else 1) > 0
-    return float(squares[-1]), far & bool(squares[-1] > 0 and not far.all())
 
 
 def _mean_posteriors(

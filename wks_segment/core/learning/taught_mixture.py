@@ -17,9 +17,10 @@ from ..poses.signature_cache import Cache
 from ..progress import Progress
 from ..user_labels import NOT_SAID
 from .gaussian_mixture import CovarianceType, GaussianMixture
+from .inside_parts import fitted_inside
 from .merge_tree import MOST_LIKENESS, MergeTree
 from .parameters import effective, least_segments
-from .part_mixture import PartMixture, fitted_inside, kinds_of, principal_axes
+from .part_mixture import PartMixture, kinds_of, principal_axes
 from .taught_parts import TaughtLabels, TaughtParts, alike_parts, with_like_neighbors
 from .training_samples import TrainingSamples
 
@@ -78,7 +79,7 @@ def learn_taught_parts(
     if lesson.unlabeled == "learn" and training.shares[~said].sum() > LEAST_LEFT:
         n_segments = least_segments(parameters["n_segments"])
         step = progress.part(0.0, 0.5, "parts")
-        kinds = kinds_of(meshes, training.standardizer, axes, n_segments, rest, cache, step)[0]
+        kinds = kinds_of(meshes, training, axes, n_segments, rest, cache, step)[0]
         of_faces = kinds.of_faces if not alone else [kinds.of_faces[0]] * len(poses)
         group[~said] = n_groups + _of_samples(poses, of_faces, kinds.count, training)[~said]
         n_groups += kinds.count
@@ -90,7 +91,7 @@ def learn_taught_parts(
     mixture, group_of = fitted_inside(
         chosen, group[group >= 0], axes, per_part * len(np.unique(group[group >= 0])), covariance_type
     )
-    return PartMixture(mixture, _tree(mixture, group_of, axes, training, n_groups, taught, kinds), None, taught)
+    return PartMixture(mixture, _tree(mixture, group_of, axes, training, n_groups, taught, kinds), False, taught)
 
 
 def of_one_body(poses: Sequence[Workpiece]) -> bool:
@@ -163,7 +164,7 @@ def _tree(
         likeness.append(-MOST_LIKENESS)
     of_components = mixture.posteriors(training.standardized)
     of_groups = of_components @ np.eye(n_groups)[group_of]
-    order = Kinds([], np.array(merges, dtype=np.int64).reshape(-1, 2), np.array(likeness), None)
+    order = Kinds([], np.array(merges, dtype=np.int64).reshape(-1, 2), np.array(likeness))
     # The measures of the tree are of all groups that occur: a kind without a component is merged with the others.
     overlaps = of_groups.T @ (of_groups * training.shares[:, None])
     areas = training.shares @ of_components

@@ -7,7 +7,8 @@ signatures are alike.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,12 +20,11 @@ from scipy.spatial.distance import squareform
 from ..mesh.triangle_mesh import BoolArray, FloatArray, IntArray
 from ..progress import Progress
 from .evidence import Evidence
-from .kind_traits import KindTraits
 from .part_graph import PartGraph
 
 FINEST, WHOLE = 2.0, 0.2
-"""Log-odds down to which regions grow before kinds are found: fine regions on one mesh, where mirrored and repeated
-ones have the same signature; parts as a whole on several meshes, because finer ones differ from body to body."""
+"""Log-odds down to which regions grow: fine regions, each of which gets a kind; and parts as a whole, which are
+clustered on several meshes to begin with, because finer ones differ from body to body."""
 LEAST_REGION = 0.003
 """Regions below this share of the area are merged with a neighbor in any case."""
 MOST_GROWN = 60
@@ -55,6 +55,10 @@ DOUBT, SIZE = 4.0, 0.75
 so fingers are merged before limbs."""
 
 
+AgreeFunction = Callable[[Sequence[PartGraph], Sequence[IntArray]], list[IntArray]]
+"""Gives the (r,) kind of each region of each mesh, on which the meshes agree, from those to begin with."""
+
+
 @dataclass(frozen=True)
 class Kinds:
     """Kinds of parts on learned meshes, and the order in which they are merged.
@@ -67,14 +71,11 @@ class Kinds:
         Kinds that each step merges, the larger one first, whose number the result keeps.
     likeness : (k − 1,) array
         Log-odds with which each step found its two kinds to be one part.
-    traits : KindTraits or None
-        Of the kinds, if there are several meshes: on others they help to tell which kind a part is.
     """
 
     of_faces: Sequence[IntArray]
     merges: IntArray
     likeness: FloatArray
-    traits: KindTraits | None
 
     @property
     def count(self) -> int:
@@ -83,9 +84,8 @@ class Kinds:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Arrays by name, to be cached; `of_arrays` reads them."""
-        traits = {} if self.traits is None else {f"trait_{name}": array for name, array in vars(self.traits).items()}
         kinds = {f"kind_{i}": kind for i, kind in enumerate(self.of_faces)}
-        return {"merges": self.merges, "likeness": self.likeness, **traits, **kinds}
+        return {"merges": self.merges, "likeness": self.likeness, **kinds}
 
     @classmethod
     def of_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> Kinds | None:
@@ -93,9 +93,7 @@ class Kinds:
         if "merges" not in arrays:
             return None
         of_faces = [arrays[f"kind_{i}"] for i in range(sum(name.startswith("kind_") for name in arrays))]
-        names = [name.removeprefix("trait_") for name in arrays if name.startswith("trait_")]
-        traits = KindTraits(**{name: arrays[f"trait_{name}"] for name in names}) if names else None
-        return cls(of_faces, arrays["merges"], arrays["likeness"], traits)
+        return cls(of_faces, arrays["merges"], arrays["likeness"])
 
 
 def n_regions_of_mesh(n_segments: int) -> int:
@@ -109,7 +107,11 @@ def n_kinds_of_bodies(n_segments: int) -> int:
 
 
 def find_kinds(
-    meshes: Sequence[Evidence], signatures: Sequence[FloatArray], n_segments: int, progress: Progress
+    meshes: Sequence[Evidence],
+    signatures: Sequence[FloatArray],
+    n_segments: int,
+    progress: Progress,
+    agree: AgreeFunction | None = None,
 ) -> Kinds:
     """Cut meshes into parts, find the kinds of these, and merge them one by one.
 
@@ -121,22 +123,21 @@ def find_kinds(
     n_segments : int
         Number of segments that there should be at least.
     progress : Progress
+    agree : function, optional
+        Makes several meshes agree on the kinds of their regions.
     """
     graphs = []
     for (evidence, signature), step in progress.each(list(zip(meshes, signatures, strict=True))):
         graph = PartGraph.of(evidence, signature, step)
-        grow(graph, FINEST if len(meshes) == 1 else WHOLE, n_regions_of_mesh(n_segments))
+        grow(graph, FINEST, n_regions_of_mesh(n_segments))
         graphs.append(graph)
     if len(meshes) == 1:
         kinds = [_repeats(meshes[0], signatures[0], graphs[0])]
     else:
-        kinds = _kinds_of_bodies(graphs, n_kinds_of_bodies(n_segments))
-    traits = None
-    if len(meshes) > 1:
-        logs = [np.log(graph.areas[graph.regions]) for graph in graphs]
-        traits = KindTraits.of(kinds, logs, [graph.touching() for graph in graphs])
-    of_faces, merges, likeness = _Merging(graphs, kinds).run()
-    return Kinds(of_faces, merges, likeness, traits)
+        kinds = _kinds_of_wholes(graphs, n_kinds_of_bodies(n_segments))
+        if agree is not None:
+            kinds = agree(graphs, kinds)
+    return Kinds(*_Merging(graphs, kinds).run())
 
 
 def grow(graph: PartGraph, least: float, most_regions: int) -> None:
@@ -173,6 +174,18 @@ def _repeats(evidence: Evidence, signature: FloatArray, graph: PartGraph) -> Int
     np.fill_diagonal(distance, 0)
     tree = scipy.cluster.hierarchy.linkage(squareform(distance, checks=False), "average")
     return np.asarray(scipy.cluster.hierarchy.fcluster(tree, SAME_KIND, "distance") - 1, dtype=np.int64)
+
+
+def _kinds_of_wholes(graphs: Sequence[PartGraph], count: int) -> list[IntArray]:
+    """(r,) kind of each region of each mesh: that of the part as a whole that it belongs to."""
+    wholes = [deepcopy(graph) for graph in graphs]
+    for graph in wholes:
+        grow(graph, WHOLE, MOST_GROWN)
+    of_wholes = _kinds_of_bodies(wholes, count)
+    return [
+        kind[np.searchsorted(whole.regions, whole.owner[graph.regions])]
+        for graph, whole, kind in zip(graphs, wholes, of_wholes, strict=True)
+    ]
 
 
 def _kinds_of_bodies(graphs: Sequence[PartGraph], count: int) -> list[IntArray]:
@@ -225,6 +238,8 @@ class _Merging:
         of_faces = [start[region] for start, region in zip(self._start, self._first, strict=True)]
         merges, likeness = [], []
         left = set(range(self._count))
+        for kind in left:
+            self._merge(kind, kind)
         table = np.full((self._count, self._count), -np.inf)
         areas = self._areas()
         for i in left:

@@ -155,6 +155,11 @@ class PartGraph:
         regions = self.regions
         return np.asarray(self.lengths[np.ix_(regions, regions)] > 0)
 
+    def ties(self) -> FloatArray:
+        """(r, r) log-odds that two of `regions` are one part, 0 where they are rather two, or do not touch."""
+        regions = self.regions
+        return np.asarray(np.maximum(self.likeness[np.ix_(regions, regions)], 0))
+
     def merge(self, first: int, second: int) -> int:
         """Merge two regions; returns the number of the larger one, which stays."""
         kept, gone = (first, second) if self.areas[first] >= self.areas[second] else (second, first)
