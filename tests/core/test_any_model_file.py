@@ -211,7 +211,7 @@ def test_a_model_or_a_reason_within_a_second_and_without_much_memory(
         return
     try:
         posteriors = model.predict_proba(described)
-        if model.kind_traits_ is not None:
+        if model.of_bodies_:
             labels = model.segment_faces(body)
             assert 0 <= labels.min() <= labels.max() < model.n_segments_
     except ValueError as error:

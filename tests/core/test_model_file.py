@@ -23,7 +23,7 @@ def text():
 
 @pytest.fixture(scope="module")
 def text_of_bodies():
-    """Of two meshes, so that the kinds of parts have traits."""
+    """Of two meshes, so that regions get kinds."""
     meshes = [creature(0.0, 2, seed=0), figure(subdivisions=2)]
     return PoseSegmentation(3, n_eigenpairs=30, n_energies=20).fit(meshes).to_json()
 
@@ -34,13 +34,13 @@ def test_a_model_is_plain_json(text):
     assert content["parameters"]["n_segments"] == 3
 
 
-def test_the_model_of_bodies_keeps_the_traits_of_kinds(text, text_of_bodies):
+def test_the_model_of_bodies_is_kept_as_one(text, text_of_bodies):
     model, mesh = PoseSegmentation.from_json(text_of_bodies), figure(0.3, 0.0, 2)
     assert model.to_json() == text_of_bodies
-    assert len(model.kind_traits_.mean) == model.grouping_.n_kinds
+    assert model.of_bodies_
     again = PoseSegmentation.from_json(model.to_json())
     np.testing.assert_array_equal(again.segment_faces(mesh), model.segment_faces(mesh))
-    assert PoseSegmentation.from_json(text).kind_traits_ is None
+    assert not PoseSegmentation.from_json(text).of_bodies_
 
 
 def changed(text, change):
@@ -196,7 +196,7 @@ def old_model():
 
 def test_segments_of_an_old_model_are_unions_of_components_as_before(old_model):
     mesh, tree = creature(0.2, 3), old_model.grouping_
-    assert (tree.n_kinds, old_model.kind_traits_) == (len(old_model.mixture_.weights), None)
+    assert (tree.n_kinds, old_model.of_bodies_) == (len(old_model.mixture_.weights), False)
     pose = old_model.describe(mesh)
     samples = old_model.standardizer_.transform(pose.signature)
     components = old_model.mixture_.posteriors(samples)

@@ -5,16 +5,13 @@ import pytest
 from shapes import creature, figure, icosphere, places_on, together
 
 from wks_segment.core import PoseSegmentation, TriangleMesh
-from wks_segment.core.labeling import own_parts as module
-from wks_segment.core.labeling.own_parts import AREA_WEIGHT, MOST_UNLIKE, NEIGHBOR_WEIGHT, TEMPER, OwnParts, own_parts
+from wks_segment.core.labeling.own_parts import OwnParts, own_parts
 from wks_segment.core.mesh.adjacency import FaceAdjacency, connected_regions
-from wks_segment.core.parts.kind_traits import KindTraits
+from wks_segment.core.parts.region_labels import MOST_UNLIKE, TEMPER
 from wks_segment.core.poses.pose_cache import Workpiece
 from wks_segment.core.progress import Progress
 
 SMALL = {"n_segments": 4, "n_eigenpairs": 40, "n_energies": 20}
-HALF = np.full((2, 2), 0.5)
-"""Of probabilities to touch: neighbors say nothing."""
 
 
 def balls():
@@ -39,77 +36,66 @@ def on_balls(large, small):
     return log_likelihoods
 
 
-def traits(areas=(0.5, 0.5), spread=10.0, touching=HALF):
-    return KindTraits(np.log(areas), np.full(len(areas), float(spread)), np.asarray(touching))
-
-
-def parts_of(workpiece, log_likelihoods, of_kinds):
-    return own_parts([workpiece], log_likelihoods, of_kinds, Progress())
+def parts_of(workpiece, log_likelihoods, n_kinds=2):
+    return own_parts([workpiece], log_likelihoods, n_kinds, Progress())
 
 
 def of_balls(parts):
     """Parts that the three balls consist of; no part may be on two of them."""
     found = [set(of_ball.tolist()) for of_ball in np.split(parts.part, 3)]
-    assert sum(len(one) for one in found) == len(set.union(*found)) == len(parts.posteriors)
+    assert sum(len(one) for one in found) == len(set.union(*found)) == len(parts.of_parts)
     return [sorted(one) for one in found]
 
 
 def check(parts, n_faces, n_kinds):
-    """What holds for parts of any mesh."""
-    count = len(parts.posteriors)
-    assert parts.part.shape == (n_faces,)
-    assert set(parts.part) == set(range(count))
-    assert parts.posteriors.shape == (count, n_kinds)
-    assert (parts.posteriors >= 0).all()
-    np.testing.assert_allclose(parts.posteriors.sum(axis=1), 1)
-    assert parts.touch.shape == (count, count)
+    """What holds for regions and parts of any mesh."""
+    for of_faces, posteriors in (parts.region, parts.posteriors), (parts.part, parts.of_parts):
+        count = len(posteriors)
+        assert of_faces.shape == (n_faces,)
+        assert set(of_faces) == set(range(count))
+        assert posteriors.shape == (count, n_kinds)
+        assert (posteriors >= 0).all()
+        np.testing.assert_allclose(posteriors.sum(axis=1), 1)
+    # A region is in one part.
+    assert len(set(zip(parts.region.tolist(), parts.part.tolist(), strict=True))) == len(parts.posteriors)
+    assert parts.touch.shape == (len(parts.of_parts),) * 2
     np.testing.assert_array_equal(parts.touch, parts.touch.T)
     assert not parts.touch.diagonal().any()
 
 
 def test_each_ball_is_a_part_that_touches_its_neighbors(workpiece):
-    parts = parts_of(workpiece, on_balls([0, -50], [-50, 0]), traits())
+    parts = parts_of(workpiece, on_balls([0, -50], [-50, 0]))
     check(parts, balls().n_faces, 2)
     (large,), (left,), (right,) = of_balls(parts)
     assert parts.touch[large, left]
     assert parts.touch[large, right]
     assert not parts.touch[left, right]
-    assert parts.posteriors.argmax(axis=1)[[large, left, right]].tolist() == [0, 1, 1]
+    assert parts.of_parts.argmax(axis=1)[[large, left, right]].tolist() == [0, 1, 1]
 
 
-def test_a_part_is_recognized_by_the_mean_over_all_of_its_faces(workpiece):
+def test_regions_that_are_one_part_have_one_kind(workpiece):
     """Faces on one side of each ball are like another kind, but those of the other side are so even more."""
 
     def log_likelihoods(pose):
         upper = places_on(pose.surface)[:, 2] > 0
         return np.where(upper[:, None], np.array([[0.0, -10]]), np.array([[-30.0, 0]]))
 
-    parts, mesh = parts_of(workpiece, log_likelihoods, traits()), balls()
-    on_faces = workpiece.surface.to_faces(log_likelihoods(workpiece))
-    for (part,) in of_balls(parts):
-        inside = parts.part == part
-        mean = np.average(on_faces[inside], axis=0, weights=mesh.face_areas[inside])
-        assert mean[0] < mean[1]
-        likelihood = np.exp(mean / TEMPER)
-        np.testing.assert_allclose(parts.posteriors[part], likelihood / likelihood.sum(), rtol=1e-6)
+    parts = parts_of(workpiece, log_likelihoods)
+    check(parts, balls().n_faces, 2)
+    assert parts.posteriors.argmax(axis=1).tolist() == [1] * len(parts.posteriors)
+    assert parts.posteriors[:, 1].min() > 0.9
 
 
 def test_signatures_count_up_to_a_limit(workpiece):
-    parts = parts_of(workpiece, on_balls([0, -1e6], [-1e6, 0]), traits())
+    parts = parts_of(workpiece, on_balls([0, -1e6], [-1e6, 0]))
+    # Nothing ties balls: a region of a ball that is one region has nothing but its signatures.
+    sizes = [len(set(region.tolist())) for region in np.split(parts.region, 3)]
+    alone = [i for i, size in enumerate(sizes) if size == 1]
     unlikely = 1 / (1 + np.exp(MOST_UNLIKE))
-    np.testing.assert_allclose(parts.posteriors.min(axis=1), unlikely, rtol=1e-6)
-
-
-def test_kinds_are_told_apart_by_their_areas(workpiece):
-    """Signatures say nothing."""
-    mesh = balls()
-    shares = [mesh.face_areas[part].sum() / mesh.area for part in np.split(np.arange(mesh.n_faces), 3)]
-    parts = parts_of(workpiece, on_balls([0, 0], [0, 0]), traits((shares[0], shares[1]), 0.5))
-    (large,), (left,), (right,) = of_balls(parts)
-    deviation = (np.log(shares[0]) - np.log(shares[1])) / 0.5
-    odds = np.exp(AREA_WEIGHT * deviation**2 / 2)
-    np.testing.assert_allclose(parts.posteriors[large], [odds / (1 + odds), 1 / (1 + odds)], rtol=0.02)
-    np.testing.assert_allclose(parts.posteriors[[left, right]], [[1 / (1 + odds), odds / (1 + odds)]] * 2, rtol=0.02)
+    assert parts.posteriors.min() > 0
+    for i in alone:
+        region = np.split(parts.region, 3)[i][0]
+        np.testing.assert_allclose(parts.posteriors[region].min(), unlikely, rtol=0.1)
 
 
 def test_log_likelihoods_are_means_over_the_poses():
@@ -117,74 +103,20 @@ def test_log_likelihoods_are_means_over_the_poses():
     mesh = balls()
     moved = TriangleMesh(mesh.vertices + (0, 0, 5), mesh.faces)
     poses = [Workpiece(pose) for pose in PoseSegmentation(**SMALL).describe_all([mesh, moved])]
-    said = {id(poses[0]): -2.0, id(poses[1]): -8.0}
+    said = {id(poses[0]): 12.0, id(poses[1]): -8.0}
 
     def log_likelihoods(pose):
         return np.tile([0.0, said[id(pose)]], (len(pose.signature), 1))
 
-    parts = own_parts(poses, log_likelihoods, traits(), Progress())
-    expected = 1 / (1 + np.exp(5 / TEMPER))
-    np.testing.assert_allclose(parts.posteriors[:, 1], expected, rtol=1e-6)
-
-
-def with_neighbors(alone, touch, touching):
-    return module._with_neighbors(np.array(alone, dtype=float), np.array(touch, dtype=bool), np.array(touching))
-
-
-ROW = np.array([(0, 1, 0), (1, 0, 1), (0, 1, 0)], dtype=bool)
-"""Three parts in a row."""
-
-
-def test_neighbors_that_always_touch_tell_the_kind():
-    """Kind 1 touches 0, kind 2 does not: the part in the middle, which could be either, touches two of kind 0."""
-    touching = [(0.1, 0.8, 0.1), (0.8, 0.1, 0.5), (0.1, 0.5, 0.1)]
-    posteriors = with_neighbors([(0, -20, -20), (-20, 0, 0.5), (0, -20, -20)], ROW, touching)
-    assert posteriors.argmax(axis=1).tolist() == [0, 1, 0]
-    odds = np.exp(0.5 + 2 * NEIGHBOR_WEIGHT * np.log(0.1 / 0.8))
-    np.testing.assert_allclose(posteriors[1], [np.exp(-20) * 0, 1 / (1 + odds), odds / (1 + odds)], atol=1e-6)
-
-
-def test_parts_that_do_not_touch_tell_the_kind_too():
-    """The two ends of the row do not touch: not both are of kinds that nearly always touch."""
-    touching = [(0.5, 0.5, 0.95), (0.5, 0.5, 0.5), (0.95, 0.5, 0.5)]
-    posteriors = with_neighbors([(0, -20, -20), (-20, 0, -20), (-20, -0.5, 0)], ROW, touching)
-    odds = np.exp(-0.5) * (0.5 * 0.5 / (0.5 * 0.05)) ** NEIGHBOR_WEIGHT
-    np.testing.assert_allclose(posteriors[2, 1:], [odds / (1 + odds), 1 / (1 + odds)], rtol=1e-6)
-
-
-def test_where_all_kinds_touch_alike_neighbors_say_nothing():
-    alone = np.log([(0.7, 0.2, 0.1), (0.3, 0.3, 0.4), (0.1, 0.1, 0.8)])
-    posteriors = with_neighbors(alone, ROW, np.full((3, 3), 0.3))
-    np.testing.assert_allclose(posteriors, np.exp(alone), rtol=1e-9)
-
-
-def test_kinds_of_all_parts_fit_together_in_the_end():
-    """No part alone would change its kind."""
-    generator = np.random.default_rng(0)
-    for _ in range(20):
-        count = int(generator.integers(1, 9))
-        touch = generator.random((count, count)) < 0.4
-        touch = np.triu(touch, 1) | np.triu(touch, 1).T
-        touching = generator.random((3, 3)) * 0.9 + 0.05
-        touching = (touching + touching.T) / 2
-        alone = 3 * generator.standard_normal((count, 3))
-        kind = with_neighbors(alone, touch, touching).argmax(axis=1)
-
-        def total(kinds, touch=touch, touching=touching, alone=alone, count=count):
-            pairs = touching[kinds[:, None], kinds]
-            logs = np.triu(np.where(touch, np.log(pairs), np.log(1 - pairs)), 1).sum()
-            return alone[np.arange(count), kinds].sum() + NEIGHBOR_WEIGHT * logs
-
-        for i in range(count):
-            for other in range(3):
-                changed = kind.copy()
-                changed[i] = other
-                assert total(changed) <= total(kind) + 1e-9
+    parts = own_parts(poses, log_likelihoods, 2, Progress())
+    assert parts.posteriors.argmax(axis=1).tolist() == [1] * len(parts.posteriors)
+    assert parts.posteriors[:, 1].min() >= 1 / (1 + np.exp(-2 / TEMPER)) - 1e-9
 
 
 def parts_with(kinds, touch, n_kinds):
     """Parts of certain kinds, each of one face."""
-    return OwnParts(np.arange(len(kinds)), np.eye(n_kinds)[np.array(kinds)], np.array(touch, dtype=bool))
+    number, posteriors = np.arange(len(kinds)), np.eye(n_kinds)[np.array(kinds)]
+    return OwnParts(number, posteriors, number, posteriors, np.array(touch, dtype=bool))
 
 
 def test_parts_of_one_group_that_touch_are_one_whole():
@@ -215,7 +147,8 @@ def test_parts_that_do_not_touch_are_wholes_of_their_own():
 
 def test_the_group_of_a_part_is_the_likeliest_one_of_all_its_kinds():
     """The likeliest kind is 0, but 1 and 2, of one group, are likelier together."""
-    parts = OwnParts(np.array([0]), np.array([[0.4, 0.3, 0.3]]), np.zeros((1, 1), dtype=bool))
+    one, posteriors = np.array([0]), np.array([[0.4, 0.3, 0.3]])
+    parts = OwnParts(one, posteriors, one, posteriors, np.zeros((1, 1), dtype=bool))
     whole, group = parts.wholes(np.array([0, 1, 1]))
     assert group[whole].tolist() == [1]
 
@@ -235,21 +168,21 @@ def borders(labels, mesh):
     return {tuple(sorted(pair)) for pair in pairs[labels[pairs[:, 0]] != labels[pairs[:, 1]]].tolist()}
 
 
-def test_each_body_is_cut_between_its_own_parts(model):
-    """Posteriors of a face are those of its part, unless nothing is smoothed."""
+def test_each_body_is_cut_between_its_own_regions(model):
+    """Posteriors of a face are those of its region, unless nothing is smoothed."""
     mesh = figure(0.5, -0.2, 2)
     workpiece = Workpiece(model.describe(mesh))
     labeler = model._labeler()
     own = labeler._own_parts([workpiece], Progress())
-    check(own, mesh.n_faces, len(model.kind_traits_.mean))
+    check(own, mesh.n_faces, model.grouping_.n_kinds)
     on_faces = labeler._on_faces([workpiece], 4, Progress())(workpiece)
-    for part in range(len(own.posteriors)):
-        assert (np.ptp(on_faces[own.part == part], axis=0) == 0).all()
+    for region in range(len(own.posteriors)):
+        assert (np.ptp(on_faces[own.region == region], axis=0) == 0).all()
     np.testing.assert_allclose(on_faces.sum(axis=1), 1)
-    # Smoothing moves borders, but most stay between the same parts.
+    # Smoothing moves borders, but most stay between the same regions.
     labels = model.segment_faces(workpiece)
-    inside = [labels[own.part == part] for part in range(len(own.posteriors))]
-    same = sum(np.bincount(of_part).max() for of_part in inside)
+    inside = [labels[own.region == region] for region in range(len(own.posteriors))]
+    same = sum(np.bincount(of_region).max() for of_region in inside)
     assert same > 0.9 * mesh.n_faces
 
 
@@ -281,7 +214,7 @@ def test_regions_of_a_body_are_connected_and_numbered_as_learned(model):
 def test_every_number_of_segments_labels_a_body(model):
     """Also more than there are kinds."""
     pose = Workpiece(model.describe(figure(0.3, 0.0, 2)))
-    for count in (1, 2, len(model.kind_traits_.mean), len(model.kind_traits_.mean) + 5, len(model.mixture_.weights)):
+    for count in (1, 2, model.grouping_.n_kinds, model.grouping_.n_kinds + 5, len(model.mixture_.weights)):
         few = model.with_segments(count)
         labels = few.segment_faces(pose)
         assert labels.shape == (BODIES[0].n_faces,)

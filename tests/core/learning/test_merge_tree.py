@@ -13,7 +13,7 @@ SHARES = np.array([0.25, 0.4, 0.35])
 
 
 def kinds(merges, likeness):
-    return Kinds([np.arange(len(merges) + 1)], np.array(merges).reshape(-1, 2), np.array(likeness, dtype=float), None)
+    return Kinds([np.arange(len(merges) + 1)], np.array(merges).reshape(-1, 2), np.array(likeness, dtype=float))
 
 
 THREE = kinds([(1, 0), (1, 2)], [0.5, -3.0])

@@ -5,9 +5,9 @@ import pytest
 from shapes import creature, figure, icosphere, places_on
 
 from wks_segment.core import MemoryCache, PoseSegmentation
-from wks_segment.core.learning import part_mixture
+from wks_segment.core.learning import inside_parts, part_mixture
+from wks_segment.core.learning.agreement import PER_KIND
 from wks_segment.core.learning.part_mixture import (
-    COMPONENTS_OF_BODIES,
     COMPONENTS_OF_MESH,
     COMPONENTS_OF_POSE,
     PER_SEGMENT,
@@ -44,20 +44,9 @@ def learned():
 
 @pytest.fixture(scope="module")
 def learned_bodies():
-    """Model of two bodies, their kinds of parts, and the kind of each component."""
-    cache, of_components = Recording(), []
-
-    def recorded(*arguments):
-        mixture, kind = fitted(*arguments)
-        of_components.append(kind)
-        return mixture, kind
-
-    fitted = part_mixture.fitted_inside
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(part_mixture, "fitted_inside", recorded)
-        model = PoseSegmentation(**SMALL).fit(BODIES, cache=cache)
-    (kind,) = of_components
-    return model, cache.kinds, kind
+    """Model of two bodies, and their kinds of parts."""
+    cache = Recording()
+    return PoseSegmentation(**SMALL).fit(BODIES, cache=cache), cache.kinds
 
 
 def test_groups_of_components_are_the_kinds_of_parts(learned):
@@ -86,32 +75,33 @@ def test_kinds_are_no_bands_of_the_signature(learned):
     assert len({kind[name] for name in ("left arm", "left leg", "head", "tail")}) == 4
 
 
-def test_one_mesh_has_no_traits_and_a_tied_covariance(learned):
+def test_one_mesh_has_a_tied_covariance(learned):
     model, _ = learned
-    assert model.kind_traits_ is None
+    assert not model.of_bodies_
     assert model.mixture_.covariance_type == "tied"
     usual = min(COMPONENTS_OF_MESH, COMPONENTS_OF_POSE * len(POSES))
     assert 0.8 * usual < len(model.mixture_.weights) < 1.2 * usual
     assert model.mixture_.weights.sum() == pytest.approx(1)
 
 
-def test_bodies_have_traits_and_a_shared_covariance(learned_bodies):
-    model, kinds, _ = learned_bodies
-    assert model.mixture_.covariance_type == "shared"
-    assert 0.8 * COMPONENTS_OF_BODIES < len(model.mixture_.weights) < 1.2 * COMPONENTS_OF_BODIES
-    assert len(model.kind_traits_.mean) == model.grouping_.n_kinds <= kinds.count
+def test_bodies_have_a_diagonal_covariance_each(learned_bodies):
+    model, kinds = learned_bodies
+    assert model.of_bodies_
+    assert model.mixture_.covariance_type == "diag"
+    assert 0.8 * PER_KIND * kinds.count < len(model.mixture_.weights) < 1.2 * PER_KIND * kinds.count
+    assert model.grouping_.n_kinds <= kinds.count
     assert [len(of_faces) for of_faces in kinds.of_faces] == [mesh.n_faces for mesh in BODIES]
 
 
-def test_traits_are_in_the_order_of_the_groups_of_components(learned_bodies):
-    model, kinds, kind = learned_bodies
-    groups = model.grouping_.groups(model.grouping_.n_kinds)
-    for component, group in enumerate(groups):
-        assert model.kind_traits_.mean[group] == kinds.traits.mean[kind[component]]
-        assert model.kind_traits_.spread[group] == kinds.traits.spread[kind[component]]
-        for other, other_group in enumerate(groups):
-            expected = kinds.traits.touching[kind[component], kind[other]]
-            assert model.kind_traits_.touching[group, other_group] == expected
+def test_models_of_bodies_rank_with_one_diagonal(learned, learned_bodies):
+    model, _ = learned_bodies
+    ranked = model._learned().for_ranking(model.mixture_)
+    assert ranked.covariance_type == "shared"
+    np.testing.assert_allclose(ranked.covariances, model.mixture_.weights @ model.mixture_.covariances)
+    poses, _ = learned
+    np.testing.assert_array_equal(
+        poses._learned().for_ranking(poses.mixture_).covariances, np.diag(poses.mixture_.covariances)
+    )
 
 
 def test_more_segments_have_more_components():
@@ -124,7 +114,7 @@ def test_more_segments_have_more_components():
 def test_the_paper_has_a_component_for_each_segment():
     model = PoseSegmentation(**SMALL, preset="paper").fit(POSES[:1])
     assert len(model.mixture_.weights) == 4
-    assert (model.grouping_, model.kind_traits_) == (None, None)
+    assert (model.grouping_, model.of_bodies_) == (None, False)
 
 
 def test_too_few_distinct_signatures_for_the_segments_are_refused():
@@ -161,7 +151,7 @@ def samples():
 @pytest.mark.parametrize("covariance_type", ["tied", "shared", "diag", "spherical"])
 def test_each_component_has_samples_of_one_kind(samples, covariance_type):
     points, shares, kind = samples
-    mixture, of_components = part_mixture.fitted_inside(training(points, shares), kind, np.eye(3), 28, covariance_type)
+    mixture, of_components = inside_parts.fitted_inside(training(points, shares), kind, np.eye(3), 28, covariance_type)
     assert set(of_components) == {0, 2, 3}
     # By the square root of the area: 25.3, 12.6 and 6.3 of 44.2.
     assert np.bincount(of_components).tolist() == [16, 0, 8, 4]
@@ -178,7 +168,7 @@ def test_each_component_has_samples_of_one_kind(samples, covariance_type):
 
 def test_full_matrices_have_one_component_for_each_kind(samples):
     points, shares, kind = samples
-    mixture, of_components = part_mixture.fitted_inside(training(points, shares), kind, np.eye(3), 28, "full")
+    mixture, of_components = inside_parts.fitted_inside(training(points, shares), kind, np.eye(3), 28, "full")
     assert of_components.tolist() == [0, 2, 3]
     for k, covariance in zip((0, 2, 3), mixture.covariances, strict=True):
         expected = np.cov(points[kind == k].T, aweights=shares[kind == k], ddof=0)
@@ -188,8 +178,8 @@ def test_full_matrices_have_one_component_for_each_kind(samples):
 def test_the_order_of_samples_does_not_matter(samples):
     points, shares, kind = samples
     order = np.random.default_rng(1).permutation(len(points))
-    first, kinds = part_mixture.fitted_inside(training(points, shares), kind, np.eye(3), 28, "tied")
-    again, kinds_again = part_mixture.fitted_inside(training(points, shares, order), kind[order], np.eye(3), 28, "tied")
+    first, kinds = inside_parts.fitted_inside(training(points, shares), kind, np.eye(3), 28, "tied")
+    again, kinds_again = inside_parts.fitted_inside(training(points, shares, order), kind[order], np.eye(3), 28, "tied")
     np.testing.assert_array_equal(kinds_again, kinds)
     np.testing.assert_allclose(again.means, first.means, atol=1e-9)
     np.testing.assert_allclose(again.covariances, first.covariances, atol=1e-9)
@@ -197,11 +187,11 @@ def test_the_order_of_samples_does_not_matter(samples):
 
 def test_equal_places_are_one_cluster():
     places = np.repeat([(0.0, 0), (1, 0), (5, 5)], [4, 3, 2], axis=0)
-    cluster = part_mixture._clusters(places, np.ones(9), 7)
+    cluster = inside_parts._clusters(places, np.ones(9), 7)
     assert set(cluster) == {0, 1, 2}
     assert len({*cluster[:4]}) == len({*cluster[4:7]}) == len({*cluster[7:]}) == 1
-    assert part_mixture._clusters(places, np.ones(9), 1).tolist() == [0] * 9
-    assert part_mixture._clusters(places[:1], np.ones(1), 5).tolist() == [0]
+    assert inside_parts._clusters(places, np.ones(9), 1).tolist() == [0] * 9
+    assert inside_parts._clusters(places[:1], np.ones(1), 5).tolist() == [0]
 
 
 def test_later_axes_count_more_than_their_variance():
@@ -249,7 +239,7 @@ FOUR = [np.arange(4)]
 )
 def test_a_kind_that_has_lost_its_area_is_merged_first(lost, merges, expected, likeness):
     """The others are merged in the order in which they were, each with its likeness."""
-    kinds = Kinds(FOUR, np.array(merges), np.array([3.0, 2.0, 1.0]), None)
+    kinds = Kinds(FOUR, np.array(merges), np.array([3.0, 2.0, 1.0]))
     left = np.where(np.arange(4) == lost, 0.0, 1.0)
     found = part_mixture._with_vanished_first(kinds, np.ones(4), left)
     assert [tuple(pair) for pair in found.merges.tolist()] == expected
@@ -259,7 +249,7 @@ def test_a_kind_that_has_lost_its_area_is_merged_first(lost, merges, expected, l
 
 def test_all_kinds_are_merged_into_one_if_several_vanish():
     for merges in ([(0, 2), (0, 3), (0, 1)], [(2, 3), (0, 2), (0, 1)], [(0, 1), (2, 3), (0, 2)]):
-        kinds = Kinds(FOUR, np.array(merges), np.array([3.0, 2.0, 1.0]), None)
+        kinds = Kinds(FOUR, np.array(merges), np.array([3.0, 2.0, 1.0]))
         for only in range(4):
             found = part_mixture._with_vanished_first(kinds, np.ones(4), 4.0 * (np.arange(4) == only))
             left = {0, 1, 2, 3}
@@ -271,7 +261,7 @@ def test_all_kinds_are_merged_into_one_if_several_vanish():
 
 
 def test_a_kind_that_keeps_enough_of_its_area_is_merged_as_before():
-    kinds = Kinds(FOUR, np.array([(0, 2), (0, 3), (0, 1)]), np.array([3.0, 2.0, 1.0]), None)
+    kinds = Kinds(FOUR, np.array([(0, 2), (0, 3), (0, 1)]), np.array([3.0, 2.0, 1.0]))
     for n_kept in (8, 3, 1):
         found = part_mixture._with_vanished_first(
             kinds, np.array([4.0, 8, 1, 1]), np.array([12.0 - n_kept, n_kept, 1, 1])

@@ -2,15 +2,14 @@ import numpy as np
 import pytest
 from shapes import creature, figure, icosphere, together
 
-from wks_segment.core import PoseSegmentation, TriangleMesh
+from wks_segment.core import MemoryCache, PoseSegmentation, TriangleMesh
 from wks_segment.core.parts.evidence import Evidence
-from wks_segment.core.parts.kind_traits import LEAST_SIZE_SPREAD, PRIOR_PAIRS, KindTraits
 from wks_segment.core.parts.kinds import FIRST, SMALL_KIND, Kinds, find_kinds
 from wks_segment.core.poses.pose_cache import Workpiece
 from wks_segment.core.progress import Progress
 
 
-def kinds_of(*meshes, n_segments=4, **parameters):
+def kinds_of(*meshes, n_segments=4, agree=None, **parameters):
     """Kinds of meshes, each in one pose or a list of poses."""
     model = PoseSegmentation(n_eigenpairs=40, n_energies=20, **parameters)
     evidences = []
@@ -19,7 +18,7 @@ def kinds_of(*meshes, n_segments=4, **parameters):
         evidences.append(Evidence.of([Workpiece(pose) for pose in described], None, Progress()))
     signatures = [mean_signature(evidence.poses) for evidence in evidences]
     mean = np.mean([signature.mean(axis=0) for signature in signatures], axis=0)
-    return find_kinds(evidences, [signature - mean for signature in signatures], n_segments, Progress())
+    return find_kinds(evidences, [signature - mean for signature in signatures], n_segments, Progress(), agree)
 
 
 def mean_signature(poses):
@@ -136,28 +135,12 @@ def test_small_kinds_are_merged_before_all_others(body):
 def test_several_bodies_share_kinds(bodies, of_bodies):
     check(of_bodies, *bodies)
     assert set.intersection(*(set(kind) for kind in of_bodies.of_faces))
-    # The first and the last one are nearly the same body, with its faces in another order.
-    first, last = of_bodies.of_faces[0], of_bodies.of_faces[2][::-1]
-    assert len(set(first) & set(last)) >= 3
-    same = bodies[0].face_areas[first == last].sum() / bodies[0].area
-    assert same > 0.8
 
 
 def test_the_same_body_with_its_faces_in_another_order_has_the_same_kinds(body):
     again = TriangleMesh(3 * body.vertices[:, [1, 2, 0]] + 1, body.faces[::-1])
     kinds = kinds_of(body, creature(0.2, 3, seed=0), again)
     np.testing.assert_array_equal(kinds.of_faces[0], kinds.of_faces[2][::-1])
-
-
-def test_only_several_bodies_have_traits_of_kinds(of_body, of_bodies):
-    assert of_body.traits is None
-    traits, count = of_bodies.traits, of_bodies.count
-    assert traits.mean.shape == traits.spread.shape == (count,)
-    assert (traits.mean <= 0).all()
-    assert (traits.spread >= LEAST_SIZE_SPREAD).all()
-    assert traits.touching.shape == (count, count)
-    assert ((traits.touching > 0) & (traits.touching < 1)).all()
-    np.testing.assert_allclose(traits.touching, traits.touching.T)
 
 
 def test_kinds_are_read_from_the_arrays_that_they_give(of_body, of_bodies):
@@ -168,9 +151,6 @@ def test_kinds_are_read_from_the_arrays_that_they_give(of_body, of_bodies):
             np.testing.assert_array_equal(found, expected)
         np.testing.assert_array_equal(again.merges, kinds.merges)
         np.testing.assert_array_equal(again.likeness, kinds.likeness)
-        assert (again.traits is None) == (kinds.traits is None)
-    for name, array in vars(of_bodies.traits).items():
-        np.testing.assert_array_equal(getattr(again.traits, name), array)
     assert Kinds.of_arrays({}) is None
 
 
@@ -204,37 +184,32 @@ def test_poses_that_do_not_move_change_nothing(body, of_body):
     np.testing.assert_allclose(again.likeness, of_body.likeness, atol=1e-2)
 
 
-def traits_of_two_meshes():
-    """Parts of the kinds 0, 0 and 1 on the first mesh, of which one pair touches; 0 and 2 touch on the second one."""
-    first, second = np.zeros((3, 3), dtype=bool), np.array([[False, True], [True, False]])
-    first[0, 2] = first[2, 0] = True
-    return KindTraits.of(
-        [np.array([0, 0, 1]), np.array([0, 2])],
-        [np.log([0.1, 0.4, 0.5]), np.log([0.2, 0.8])],
-        [first, second],
-    )
+def test_meshes_agree_on_the_kinds_of_their_regions():
+    """The function is given the regions of both meshes, with a kind each, and its kinds are those of the faces."""
+    seen = []
+
+    def agree(graphs, kinds):
+        seen.append([len(graph.regions) for graph in graphs])
+        assert [len(of_mesh) for of_mesh in kinds] == seen[0]
+        return [np.arange(len(of_mesh)) % 3 for of_mesh in kinds]
+
+    bodies = creature(0.0, 2, seed=0), figure(subdivisions=2)
+    kinds = kinds_of(*bodies, agree=agree)
+    check(kinds, *bodies)
+    assert len(kinds.merges) == 2
+    assert len(seen) == 1
 
 
-def test_traits_have_means_and_spreads_of_logarithms_of_areas():
-    traits = traits_of_two_meshes()
-    np.testing.assert_allclose(np.exp(traits.mean), [0.2, 0.5, 0.8])
-    np.testing.assert_allclose(traits.spread, [np.sqrt(2 / 3) * np.log(2), LEAST_SIZE_SPREAD, LEAST_SIZE_SPREAD])
+def test_nearly_the_same_body_has_the_same_kinds_once_all_agree(body, bodies):
+    """Its faces are in another order."""
+    kept = {}
 
+    class Recording(MemoryCache):
+        def keep(self, key, arrays):
+            kept[key] = Kinds.of_arrays(arrays)
 
-def test_traits_have_the_share_of_pairs_that_touch_beside_the_usual_one():
-    touching = traits_of_two_meshes().touching
-    # In both orders eight pairs, of which four touch; the usual share has one more of either kind of pair.
-    usual = (4 + 1) / (8 + 2)
-    expected = np.full((3, 3), usual)
-    expected[0, 0] = (0 + PRIOR_PAIRS * usual) / (2 + PRIOR_PAIRS)
-    expected[0, 1] = expected[1, 0] = (1 + PRIOR_PAIRS * usual) / (2 + PRIOR_PAIRS)
-    expected[0, 2] = expected[2, 0] = (1 + PRIOR_PAIRS * usual) / (1 + PRIOR_PAIRS)
-    np.testing.assert_allclose(touching, expected)
-
-
-def test_traits_of_kinds_are_those_of_the_chosen_ones():
-    traits = traits_of_two_meshes()
-    chosen = traits.of_kinds(np.array([2, 0]))
-    np.testing.assert_array_equal(chosen.mean, traits.mean[[2, 0]])
-    np.testing.assert_array_equal(chosen.spread, traits.spread[[2, 0]])
-    np.testing.assert_array_equal(chosen.touching, traits.touching[[2, 0]][:, [2, 0]])
+    PoseSegmentation(4, n_eigenpairs=40, n_energies=20).fit(bodies, cache=Recording())
+    (kinds,) = (kinds for kinds in kept.values() if kinds is not None)
+    check(kinds, *bodies)
+    first, last = kinds.of_faces[0], kinds.of_faces[2][::-1]
+    assert body.face_areas[first == last].sum() / body.area > 0.8

@@ -76,12 +76,16 @@ class PartMixture:
     def for_ranking(self, mixture: GaussianMixture) -> GaussianMixture:
         """A mixture of these parts as its densities tell which model fits a shape.
 
+        Of several bodies one diagonal counts for all components: a variance of each would fit the learned bodies alone.
+
         A full covariance tells parts of one mesh apart, but between meshes its small eigenvalues, which are noise of
         the learned poses, outweigh everything else: variances alone count. The paper's setting is kept, and models of
         0.1.0, whose usual scores were computed with the covariance that they have.
         """
         if self.grouping is None or self.grouping.areas is None:
             return mixture
+        if self.of_bodies and mixture.covariance_type == "diag":
+            return GaussianMixture("shared", mixture.weights, mixture.means, mixture.weights @ mixture.covariances)
         return mixture.without_correlations()
 
 
