@@ -60,7 +60,7 @@ class PoseSegmentation(PoseLabeling, Estimator):
     covariance_type : "auto", "shared", "diag", "full", "tied" or "spherical"
         "shared" is one diagonal covariance for all components, which the paper proposes; "tied" is one full matrix for
         all, which fits poses of one mesh more closely, but over-fits on several bodies. "auto" is "tied" if all poses
-        are of one mesh, and "shared" on several. "full" has one component for each kind of part.
+        are of one mesh, and "diag" on several. "full" has one component for each kind of part.
     n_eigenpairs : int
         Number of eigenpairs of each pose, not counting the zero modes of further islands.
     n_energies : int

@@ -26,7 +26,8 @@ def samples(n_meshes, each=40):
 
 def agreed(kinds, least=1):
     training, region = samples(len(kinds))
-    return agreed_kinds([np.array(one) for one in kinds], [np.zeros((4, 4))] * len(kinds), region, training, np.eye(2), least)
+    ties = [np.zeros((4, 4))] * len(kinds)
+    return agreed_kinds([np.array(one) for one in kinds], ties, region, training, np.eye(2), least)
 
 
 def test_what_all_say_stays():

@@ -171,9 +171,9 @@ class WKSSegmentSettings(TeachSettings, bpy.types.PropertyGroup):
         name="Covariance",
         description="Shape that the mixture gives to each of its components",
         items=[
-            ("auto", "Automatic", "Tied for poses of one mesh, Shared for several bodies"),
-            ("shared", "Shared", "One diagonal covariance for all components, which transfers best to other bodies"),
-            ("diag", "Diagonal", "A diagonal covariance for each component"),
+            ("auto", "Automatic", "Tied for poses of one mesh, Diagonal for several bodies"),
+            ("shared", "Shared", "One diagonal covariance for all components, as the paper proposes"),
+            ("diag", "Diagonal", "A diagonal covariance for each component, which recognizes other bodies best"),
             ("spherical", "Spherical", "One variance for each component"),
             ("tied", "Tied", "One full covariance for all components, which overfits on several bodies"),
             ("full", "Full", "A full covariance for each kind of part, which overfits with few poses"),
