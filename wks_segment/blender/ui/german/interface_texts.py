@@ -130,7 +130,7 @@ GERMAN_INTERFACE = {
     "Shape that the mixture gives to each of its components": "Form, die die Mischung jeder ihrer Komponenten gibt",
     "Tied for poses of one mesh, Diagonal for several bodies": "Verbunden für Posen eines Meshs, Diagonal für mehrere Körper",
     "Shared": "Gemeinsam",
-    "One diagonal covariance for all components, as the paper proposes": "Eine diagonale Kovarianz für alle Komponenten, wie das Paper sie vorschlägt",
+    "One diagonal covariance for all components, as the paper proposes": "Eine diagonale Kovarianz für alle Komponenten, wie der Artikel sie vorschlägt",
     "Diagonal": "Diagonal",
     "A diagonal covariance for each component, which recognizes other bodies best": "Eine diagonale Kovarianz für jede Komponente, die andere Körper am besten erkennt",
     "Spherical": "Sphärisch",
