@@ -323,10 +323,10 @@ class RealBlender:
         # The menu leaves the segment itself out, and its first item is chosen by one press.
         self.key(*["Down"] * (into + (into < index)), "Return")
 
-    def choose(self, name: str, letter: str) -> None:
-        """Open a menu of the side panel and press the underlined letter of an item."""
+    def choose(self, name: str, *keys: str) -> None:
+        """Open a menu of the side panel and press the underlined letter of an item, or Down up to it and Return."""
         self.press(name)
-        self.key(letter)
+        self.key(*keys)
         self.clicks += 1  # a user clicks on the item
 
     def over_viewport(self) -> None:

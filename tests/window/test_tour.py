@@ -11,8 +11,8 @@ from conftest import ROOT
 LARGE, SMALL = "Creature", "Calf"
 MAX_UNDONE = 3
 """Most steps of undo that a step of the tour may take: two where a field and a button are used."""
-PALETTES = 3
-"""Palettes besides the first one, in the order of the menu."""
+PALETTES = ("Maximally Different", "Color-Blind Safe", "Maximally Different (Old)")
+"""Palettes below the one that is in use at first, in the order of the menu."""
 
 
 class Tour:
@@ -105,11 +105,8 @@ def press(window, name):
     return {"places": [name], "clicks": lambda: window.press(name)}
 
 
-def choose_below(window, name):
-    """Choose the item below the current one of a menu, which opens on the current one."""
-    window.press(name)
-    window.key("Down", "Return")
-    window.clicks += 1
+def choose(window, name, *keys):
+    return {"places": [name], "clicks": lambda: window.choose(name, *keys)}
 
 
 @pytest.mark.timeout(3600)
@@ -119,7 +116,7 @@ def test_tour_of_the_panel(tour):
     step("Smoothness", places=["smoothness"], clicks=lambda: window.enter("smoothness", "0"), changes=differs(LABELS))
     step("Segments 5", places=["n_segments"], clicks=lambda: window.enter("n_segments", "5"),
          wait=("n_segments", SMALL, 5), changes=differs(LABELS))  # fmt: skip
-    step("Left and Right", places=["sides"], clicks=lambda: window.choose("sides", "l"), changes=differs(LABELS))
+    step("Left and Right", **choose(window, "sides", "l"), changes=differs(LABELS))
     step("Merge", places=["active_segment", "wks_segment.split_segment"], clicks=lambda: window.merge(1, into=0),
          changes=differs(LABELS))  # fmt: skip
 
@@ -132,18 +129,12 @@ def test_tour_of_the_outputs(tour):
     window.press("wks_segment.learn")
     window.wait_for("segments", SMALL)
     window.wait_for("job_is_over")
-    for number in range(PALETTES):
-        step(
-            f"Palette {number + 2}",
-            places=["palette"],
-            clicks=lambda: choose_below(window, "palette"),
-            changes=differs(COLORS),
-        )
+    for number, name in enumerate(PALETTES, 2):
+        step(f"Palette {name}", **choose(window, "palette", *["Down"] * number, "Return"), changes=differs(COLORS))
     step("Ucupaint", **press(window, "write_ucupaint"), changes=new("attribute __yp_color_id"))
     step("Materials", **press(window, "write_materials"), changes=differs("slots"))
     for kind in ("hard", "soft"):
-        step(f"Vertex Groups, {kind}", places=["vertex_groups"], clicks=lambda: choose_below(window, "vertex_groups"),
-             changes=differs("weights"))  # fmt: skip
+        step(f"Vertex Groups, {kind}", **choose(window, "vertex_groups", kind[0]), changes=differs("weights"))
     step("Face Sets", **press(window, "write_face_sets"), changes="face sets")
     step("Seams", **press(window, "write_seams"), changes=differs("seams"))
     step("no Colors", **press(window, "write_colors"), changes=differs("shown colors"))
