@@ -18,6 +18,7 @@ import numpy as np
 from mathutils import Matrix, Vector
 from PIL import Image
 
+import wks_segment.blender
 from scripts._pictures import FOLDER, run
 from wks_segment.blender.cli.demo_scene import creature_in
 from wks_segment.blender.outputs.part_attributes import FACE_ATTRIBUTE

@@ -25,14 +25,12 @@ from ..poses.pose_signature import PoseSignature, of_one_mesh
 from ..progress import Progress
 from .learned_areas import with_learned_areas
 from .own_parts import OwnParts, own_parts
-from .polygons import Cleaning, PolygonMesh
+from .polygons import AVERAGED, Cleaning, PolygonMesh
 from .region_atlas import RegionAtlas
 from .sides import have_counterpart, side_field, sides_in_pose
 from .taught_sides import halves
 from .traits import Regions, Traits, fields_of, mean_traits
 
-AVERAGED = 0.4
-"""Share of the time of labeling after which the posteriors of all poses are averaged; the graph cut cannot report."""
 LABELS_SHARE = 0.7
 """Share of the time of finding regions that their labels take; the rest is recognizing the regions."""
 MIN_SHARE = 0.005
