@@ -11,7 +11,7 @@ from conftest import ROOT
 LARGE, SMALL = "Creature", "Calf"
 MAX_UNDONE = 3
 """Most steps of undo that a step of the tour may take: two where a field and a button are used."""
-PALETTES = ("Maximally Different", "Color-Blind Safe", "Maximally Different (Old)")
+PALETTES = ("Maximally Different", "Color-Blind Safe", "Different (Old)")
 """Palettes below the one that is in use at first, in the order of the menu."""
 
 
