@@ -29,7 +29,7 @@ class Tour:
             LARGE: {key: value for key, value in ask("contents", LARGE).items() if key != "objects"},
             SMALL: ask("contents", SMALL),
             "settings": ask("state")["settings"],
-            "list": [row[:3] for row in ask("rows")],
+            "list": [[name, round(share, 3), hidden] for name, share, hidden, _ in ask("rows")],
             "images": ask("images"),
             "face sets": {name: ask("face_sets", name) for name in (LARGE, SMALL)},
         }
