@@ -5,26 +5,18 @@ Each shows the creature of the demo in two poses. Needs bpy and Pillow (`make` i
 
 from __future__ import annotations
 
-import os
-import sys
-import tempfile
-import traceback
-from pathlib import Path
-
 import bpy
 import numpy as np
-from mathutils import Matrix, Vector
-from PIL import Image
+from mathutils import Vector
 
 import wks_segment.blender
+from scripts._pictures import FOLDER, Body, axes_of_view, rendered, run
 from wks_segment.blender.cli.demo_scene import creature_in
 from wks_segment.blender.parts.part_style import Style
-from wks_segment.blender.render.contact_sheet import paint, picture_scene, render
 from wks_segment.blender.scene.poses import Pose, read_pose
 from wks_segment.core import PoseSegmentation, eigenpairs
 from wks_segment.core.mesh.triangle_mesh import FloatArray
 
-FOLDER = Path(__file__).resolve().parent.parent / "docs" / "images"
 SIZE = (720, 320)
 """Width and height of a picture, in pixels."""
 LEARNED, SHOWN = (1, 10, 20, 32, 44), (1, 20)
@@ -77,38 +69,17 @@ def shades(scale: FloatArray, values: FloatArray, low: float, high: float) -> Fl
 
 def draw(name: str, poses: list[Pose], colors: list[FloatArray]) -> None:
     """Render poses side by side, in (n, 3) colors of their vertices or (m, 3) of their faces, to a file of the docs."""
-    toward = VIEW_DIRECTION.normalized()
-    right = Vector((0, 0, 1)).cross(toward).normalized()
-    axes = np.array([right, toward.cross(right), toward])
+    axes = axes_of_view(VIEW_DIRECTION)
     placed = [pose.mesh.vertices @ axes.T for pose in poses]
     size = 1.1 * max(np.ptp(points[:, 0]) for points in placed)
-    with picture_scene() as scene, tempfile.TemporaryDirectory() as folder:
-        for i, (pose, points, color) in enumerate(zip(poses, placed, colors, strict=True)):
-            middle = (points.min(axis=0) + points.max(axis=0)) / 2
-            mesh = bpy.data.meshes.new("pose")
-            faces = pose.mesh.faces
-            mesh.from_pydata(((points - middle) / size + [i - 0.5, 0, 0]).tolist(), [], faces.tolist())
-            mesh.shade_smooth()
-            paint(mesh, color[faces.ravel()] if len(color) == len(points) else np.repeat(color, 3, axis=0))
-            scene.collection.objects.link(bpy.data.objects.new("pose", mesh))
-        camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
-        camera.data.type, camera.data.ortho_scale = "ORTHO", 2.0
-        camera.matrix_world = Matrix.Translation((0, 0, 10))
-        scene.collection.objects.link(camera)
-        scene.camera = camera
-        path = Path(folder, "picture.png")
-        render(scene, path, *SIZE)
-        with Image.open(path) as picture:
-            picture.convert("RGB").quantize(N_COLORS).save(FOLDER / f"{name}.png", optimize=True)
+    bodies: list[Body] = []
+    for i, (pose, points, color) in enumerate(zip(poses, placed, colors, strict=True)):
+        middle = (points.min(axis=0) + points.max(axis=0)) / 2
+        bodies.append(((points - middle) / size + [i - 0.5, 0, 0], pose.mesh.faces, color))
+    picture = rendered(bodies, 2.0, SIZE, smooth=True)
+    picture.quantize(N_COLORS).save(FOLDER / f"{name}.png", optimize=True)
     print(FOLDER / f"{name}.png", flush=True)
 
 
 if __name__ == "__main__":
-    code = 1
-    try:
-        main()
-        code = 0
-    except BaseException:
-        traceback.print_exc()
-    sys.stdout.flush()
-    os._exit(code)  # bpy may hang at a normal exit
+    run(main)

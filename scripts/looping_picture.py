@@ -9,28 +9,24 @@ action with "walk" in its name. Needs bpy and Pillow (`make` installs both in .v
 from __future__ import annotations
 
 import argparse
-import os
-import sys
-import tempfile
-import traceback
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 import bpy
 import numpy as np
-from mathutils import Matrix, Vector
+from mathutils import Vector
 from PIL import Image, ImageDraw, ImageFont
 
 import wks_segment.blender
+from scripts._pictures import FOLDER, axes_of_view, rendered, run
 from wks_segment.blender.outputs.part_attributes import labels_on
 from wks_segment.blender.parts.part_style import Style
-from wks_segment.blender.render.contact_sheet import paint, picture_scene, render
 from wks_segment.blender.scene import poses
 from wks_segment.blender.scene.characters import Character, group
 from wks_segment.core.mesh.triangle_mesh import FloatArray, IntArray
 
-OUTPUT = Path(__file__).resolve().parent.parent / "docs" / "images" / "walk.gif"
+OUTPUT = FOLDER / "walk.gif"
 SIZE = (640, 360)
 """Width and height of the picture, in pixels."""
 FRAMES_PER_SECOND = 12
@@ -129,17 +125,15 @@ def drawn(scenes: list[Scene]) -> Iterator[Image.Image]:
             start, end = bpy.context.scene.frame_start, bpy.context.scene.frame_end
             bpy.context.scene.frame_set(start + round(frame * 24 / FRAMES_PER_SECOND) % max(end - start, 1))
             pose = poses.read_pose(bpy.context, scene.character, "frame")
-            picture = rendered(pose, scene.labels, place)
+            picture = without_overlay(pose, scene.labels, place)
             yield with_overlay(picture, scene, frame)
             frame += 1
 
 
 def placement(points: FloatArray) -> FloatArray:
     """(4, 4) matrix from the world to the picture, in which the character has its usual size."""
-    toward = VIEW_DIRECTION.normalized()
-    right = Vector((0, 0, 1)).cross(toward).normalized()
     matrix = np.eye(4)
-    matrix[:3, :3] = np.array([right, toward.cross(right), toward])
+    matrix[:3, :3] = axes_of_view(VIEW_DIRECTION)
     turned = points @ matrix[:3, :3].T
     size = ROOM * np.ptp(turned[:, 0])
     matrix[:3] /= max(size, ROOM * np.ptp(turned[:, 1]) * SIZE[0] / SIZE[1])
@@ -147,26 +141,12 @@ def placement(points: FloatArray) -> FloatArray:
     return matrix
 
 
-def rendered(pose: poses.Pose, labels: IntArray | None, place: FloatArray) -> Image.Image:
-    """A frame without overlay."""
+def without_overlay(pose: poses.Pose, labels: IntArray | None, place: FloatArray) -> Image.Image:
+    """A frame without caption, button and mouse."""
     colors = np.full((len(pose.mesh.faces), 3), GRAY)
     if labels is not None:
         colors = Style().colors_of(labels[pose.polygon_of])
-    with picture_scene() as scene, tempfile.TemporaryDirectory() as folder:
-        mesh = bpy.data.meshes.new("pose")
-        points = pose.mesh.vertices @ place[:3, :3].T + place[:3, 3]
-        mesh.from_pydata(points.tolist(), [], pose.mesh.faces.tolist())
-        paint(mesh, np.repeat(colors, 3, axis=0))
-        scene.collection.objects.link(bpy.data.objects.new("pose", mesh))
-        camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
-        camera.data.type, camera.data.ortho_scale = "ORTHO", 1.0
-        camera.matrix_world = Matrix.Translation((0, 0, 10))
-        scene.collection.objects.link(camera)
-        scene.camera = camera
-        path = Path(folder, "frame.png")
-        render(scene, path, *SIZE)
-        with Image.open(path) as picture:
-            return picture.convert("RGB")
+    return rendered([(pose.mesh.vertices @ place[:3, :3].T + place[:3, 3], pose.mesh.faces, colors)], 1.0, SIZE)
 
 
 def with_overlay(picture: Image.Image, scene: Scene, frame: int) -> Image.Image:
@@ -184,11 +164,4 @@ def with_overlay(picture: Image.Image, scene: Scene, frame: int) -> Image.Image:
 
 
 if __name__ == "__main__":
-    code = 1
-    try:
-        main()
-        code = 0
-    except BaseException:
-        traceback.print_exc()
-    sys.stdout.flush()
-    os._exit(code)  # bpy may hang at a normal exit
+    run(main)

@@ -9,9 +9,6 @@ Learns with the operators, as an artist does. Needs bpy and Pillow (`make` insta
 from __future__ import annotations
 
 import argparse
-import os
-import sys
-import traceback
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,6 +19,7 @@ from mathutils import Matrix, Vector
 from PIL import Image
 
 import wks_segment.blender
+from scripts._pictures import FOLDER, run
 from wks_segment.blender.cli.demo_scene import creature_in
 from wks_segment.blender.outputs.part_attributes import FACE_ATTRIBUTE
 from wks_segment.blender.render.contact_sheet import Tile, render_poses
@@ -29,7 +27,6 @@ from wks_segment.blender.scene import poses
 from wks_segment.blender.scene.characters import Character
 from wks_segment.core.mesh.triangle_mesh import IntArray
 
-FOLDER = Path(__file__).resolve().parent.parent / "docs" / "images"
 TILE_WIDTH = 340
 """Width of a tile, in pixels."""
 N_COLORS = 256
@@ -124,6 +121,7 @@ def main() -> None:
     options = parser.parse_args()
     if unknown := set(options.names) - set(SHEETS):
         parser.error(f"there is no picture {', '.join(sorted(unknown))}")
+    wks_segment.blender.register()
     models: dict[Any, str] = {}
     for name in options.names or SHEETS:
         path = options.folder / f"parameter_{name}.png"
@@ -172,16 +170,4 @@ def labeled(character: Character, changes: dict[str, Any], known: tuple[Any, dic
 
 
 if __name__ == "__main__":
-    wks_segment.blender.register()
-    code = 1
-    try:
-        main()
-        code = 0
-    except SystemExit as end:  # argparse
-        code = int(end.code or 0)
-    except BaseException:
-        traceback.print_exc()
-    wks_segment.blender.unregister()
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(code)  # some versions of bpy crash or hang at a normal exit
+    run(main)

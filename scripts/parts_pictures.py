@@ -10,10 +10,7 @@ None of these meshes was taught; below each is the share of its area whose name 
 from __future__ import annotations
 
 import argparse
-import os
-import sys
 import tempfile
-import traceback
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -24,7 +21,7 @@ from benchmarks import rigs
 from benchmarks.pictures import Shape, picture
 from benchmarks.taught import named_right, on_rig
 from scripts import make_starter_models as starters
-from scripts.how_it_works import FOLDER
+from scripts._pictures import FOLDER, run
 from scripts.parameter_pictures import N_COLORS
 from wks_segment.core import DiskCache, PoseSegmentation, TriangleMesh, connect
 
@@ -88,11 +85,4 @@ def save(name: str, shapes: Sequence[Shape], y_is_up: bool = True) -> None:
 
 
 if __name__ == "__main__":
-    code = 1
-    try:
-        main()
-        code = 0
-    except BaseException:
-        traceback.print_exc()
-    sys.stdout.flush()
-    os._exit(code)  # bpy may hang at a normal exit
+    run(main)

@@ -15,10 +15,10 @@ from tests.window.driver import SUITES, RealBlender, build_zip
 
 IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
 BODY = "Creature"
-SUBPANELS = {"outputs": "write_materials", "models": "wks_segment.save_model", "advanced": "snap_to"}
-"""Sub-panel to one of its buttons."""
-MARGIN_BELOW = 70
-"""Pixels below the last button, which show the titles of closed sub-panels."""
+LAST_OUTPUT = "wks_segment.transfer"
+"""The lowest button of *Outputs* above a menu, which Blender tells no name of."""
+MARGIN_BELOW = 91
+"""Pixels below that button, which show the menu and the titles of closed sub-panels."""
 
 
 def main() -> None:
@@ -30,39 +30,33 @@ def main() -> None:
     folder = Path(os.environ.get("WKS_SEGMENT_WINDOW", "window"))
     with tempfile.TemporaryDirectory() as temporary, RealBlender(options.blender, folder) as blender:
         blender.install_extension(build_zip(Path(temporary)))
-        blender.start(blender.make_scene("creature", "creature.blend"), beautiful=True)
+        blender.start(blender.make_scene("creature", "creature.blend"))
         blender.ask("zoom_to_all")
         take(blender, options.output)
 
 
 def take(blender: RealBlender, folder: Path) -> None:
-    """Go through the first steps of an artist, with a screenshot of each."""
+    """Learn from a character as in the docs, with a picture of the window and one of the panel with its outputs."""
     blender.select(BODY)
     blender.open_sidebar()
-    blender.over_viewport()
-    viewport(blender, folder / "window_before.png")
     blender.press("wks_segment.learn")
     blender.wait_for("segments", BODY)
-    blender.over_viewport()
-    viewport(blender, folder / "panel.png")
-    for name, button in SUBPANELS.items():
-        blender.find(button)  # opens its sub-panel
-        panel(blender, folder / f"panel_{name}.png")
-
-
-def viewport(blender: RealBlender, path: Path) -> None:
-    """Save the 3D viewport with its side panel."""
-    x, y, width, height = blender.ask("region", "WINDOW")
-    blender.settle()
-    blender.screenshot(path, (x, y, width, height))
-
-
-def panel(blender: RealBlender, path: Path) -> None:
-    """Save the side panel down to its last button."""
+    blender.wait_for("job_is_over")
+    picture(blender, folder / "panel.png", blender.ask("region", "WINDOW"))
+    blender.find("write_materials")  # opens its sub-panel
     x, y, width, height = blender.ask("region", "UI")
-    last = max(place[1] for place in blender.ask("button", "none of these").values())
+    _, last = blender.find(LAST_OUTPUT)
+    picture(blender, folder / "panel_outputs.png", [x, y, width, min(height, last - y + MARGIN_BELOW)])
+
+
+def picture(blender: RealBlender, path: Path, box: list[int]) -> None:
+    """Save a box of the screen, with smooth edges and no button under the mouse."""
     blender.over_viewport()
-    blender.screenshot(path, (x, y, width, min(height, last - y + MARGIN_BELOW)))
+    blender.ask("antialias", True)
+    blender.settle()
+    blender.screenshot(path, (box[0], box[1], box[2], box[3]))
+    blender.ask("antialias", False)
+    print(path, flush=True)
 
 
 if __name__ == "__main__":

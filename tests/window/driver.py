@@ -69,6 +69,8 @@ class RealBlender:
         self._running: list[subprocess.Popen[bytes]] = []
         self._mounted: list[Path] = []
         self._asked = 0
+        self._places: dict[str, tuple[int, int]] = {}
+        """Where buttons of the side panel were last."""
 
     def __enter__(self) -> RealBlender:
         subprocess.run([HERE / "install.sh", SUITES[self.version], self.root], check=True)
@@ -115,11 +117,10 @@ class RealBlender:
         shutil.copyfile(path, self.shared / path.name)
         return f"/window/{path.name}"
 
-    def start(self, *arguments: str, beautiful: bool = False) -> None:
-        """Open the window, with a file if its name is given, and wait until it is drawn; `beautiful` is slow."""
+    def start(self, *arguments: str) -> None:
+        """Open the window, with a file if its name is given, and wait until it is drawn."""
         self.bring(HERE / "inside.py")
-        if beautiful:
-            (self.shared / "beautiful").touch()
+        self._places.clear()
         for name in ("answer", "question"):
             (self.shared / name).unlink(missing_ok=True)
         screen = f"{WIDTH}x{HEIGHT}x24"
@@ -254,21 +255,30 @@ class RealBlender:
 
     def find(self, name: str) -> tuple[int, int]:
         """Position of the button of an operator or property in the side panel; its sub-panel is opened if necessary."""
-        buttons = self.ask("button", name)
-        if isinstance(buttons, list):
-            return buttons[0], buttons[1]
+        # Where it was is looked first: a search takes half a minute, and the panel hardly ever moves.
+        if name in self._places and self.ask("button_at", *self._places[name]) == name:
+            return self._places[name]
+        buttons = self._look_for(name)
+        if name in buttons:
+            return self._places[name]
         # Sub-panels follow the last button. A click on a header opens the panel, another click closes it.
         x, last = max(buttons.values(), key=lambda place: place[1])
         clicks = self.clicks
         for header in range(last + HEADER_HEIGHT, last + 8 * HEADER_HEIGHT, HEADER_HEIGHT):
             self.click(x, header)
-            opened = self.ask("button", name)
-            if isinstance(opened, list):
+            opened = self._look_for(name, header)
+            if name in opened:
                 self.clicks = clicks + 1  # a user reads the title and clicks once
-                return opened[0], opened[1]
-            if opened.keys() != buttons.keys():
+                return self._places[name]
+            if opened:
                 self.click(x, header)
         raise WindowError(f"the side panel has no {name}: {', '.join(sorted(buttons))}")
+
+    def _look_for(self, name: str, below: int = 0) -> dict[str, list[int]]:
+        """Positions of the buttons of the side panel below a height, up to that of a name if it is there."""
+        buttons: dict[str, list[int]] = self.ask("buttons", name, below)
+        self._places |= {each: (x, y) for each, (x, y) in buttons.items()}
+        return buttons
 
     def press(self, name: str) -> None:
         """Click on a button of the side panel."""
@@ -313,10 +323,10 @@ class RealBlender:
         # The menu leaves the segment itself out, and its first item is chosen by one press.
         self.key(*["Down"] * (into + (into < index)), "Return")
 
-    def choose(self, name: str, letter: str) -> None:
-        """Open a menu of the side panel and press the underlined letter of an item."""
+    def choose(self, name: str, *keys: str) -> None:
+        """Open a menu of the side panel and press the underlined letter of an item, or Down up to it and Return."""
         self.press(name)
-        self.key(letter)
+        self.key(*keys)
         self.clicks += 1  # a user clicks on the item
 
     def over_viewport(self) -> None:

@@ -42,6 +42,12 @@ def settle():
         yield
 
 
+def antialias(on):
+    """Draw smooth edges, for pictures: without a graphics card each redraw takes half a second then."""
+    bpy.context.preferences.system.viewport_aa = "8" if on else "OFF"
+    yield from settle()
+
+
 def region(kind):
     """[x, y, width, height] of a region of the 3D viewport: WINDOW, UI, HUD, HEADER."""
     found = _region(kind)
@@ -53,8 +59,8 @@ def tab():
     return _region("UI").active_panel_category if _view3d().spaces.active.show_region_ui else ""
 
 
-def button(name, kind="UI"):
-    """[x, y] of the button of an operator or property in a region; if there is none, positions of all others by name.
+def buttons(wanted="", below=0, kind="UI"):
+    """{name: [x, y]} of the buttons of operators and properties in a region below a height: all, or up to a wanted one.
 
     The mouse is moved down one column after the other. At each point Blender tells what Ctrl-C would copy there.
     """
@@ -62,20 +68,28 @@ def button(name, kind="UI"):
     found = {}
     for across in PROBE_COLUMNS:
         x = int(left + across * width)
-        for y in range(top + PROBE_STEP, top + height, PROBE_STEP):
+        for y in range(max(top, below) + PROBE_STEP, top + height, PROBE_STEP):
             _window().cursor_warp(x, _window().height - y)
             yield
             here = _hovered(kind)
-            if here == name:
+            if here and here == wanted:
                 yield from settle()  # while a job runs, Blender lags behind the mouse: it may still be where it was
                 here = _hovered(kind)
-            if here == name:
-                return [x, y + PROBE_STEP // 3]
-            found[here] = [x, y]
-            last = max((place[1] for key, place in found.items() if key), default=top + 400)
-            if here == "" and y > last + 26 * PROBE_STEP:
+            if here:
+                found.setdefault(here, [x, y + PROBE_STEP // 3])  # a list has its name in each row
+            if here and here == wanted:
+                return found
+            last = max((place[1] for place in found.values()), default=max(top + 400, below))
+            if not here and y > last + 26 * PROBE_STEP:
                 break  # below the last panel
-    return {key: place for key, place in found.items() if key}
+    return found
+
+
+def button_at(x, y, kind="UI"):
+    """Operator or property at a point of a region; "" if there is none."""
+    _window().cursor_warp(x, _window().height - y)
+    yield from settle()
+    return _hovered(kind)
 
 
 def place_of(name):
@@ -189,6 +203,11 @@ def image_colors(name):
     image.pixels.foreach_get(pixels)
     found, count = np.unique((pixels.reshape(-1, 4) * 255).round().astype(int), axis=0, return_counts=True)
     return {" ".join(map(str, color)): int(n) for color, n in zip(found, count, strict=True)}
+
+
+def images():
+    """Name of each image."""
+    return sorted(image.name for image in bpy.data.images)
 
 
 def objects():
@@ -394,6 +413,5 @@ class Responder:
 
 if __name__ == "__main__":
     bpy.context.preferences.view.show_splash = False
-    if not os.path.exists(FOLDER + "beautiful"):  # without a graphics card each redraw would take half a second
-        bpy.context.preferences.system.viewport_aa = "OFF"
+    antialias(False)
     bpy.app.timers.register(Responder().advance, first_interval=1.0, persistent=True)

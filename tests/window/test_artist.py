@@ -3,8 +3,8 @@
 import pytest
 
 BODY = "Creature"
-MAX_CLICKS = 10
-"""Largest number of clicks from the ZIP to a baked ID map."""
+MAX_CLICKS_TO_COLORS, MAX_CLICKS = 6, 10
+"""Largest numbers of clicks from the ZIP to the first colored character, and to a baked ID map."""
 
 EMPTY_COLOR = "0 0 0 255"
 """Color of pixels that no face covers."""
@@ -116,6 +116,8 @@ def test_from_the_zip_to_a_baked_id_map(window, shot):
     window.press("wks_segment.learn")
     window.wait_for("segments", BODY)
     window.wait_for("job_is_over")
+    assert clicks + window.clicks <= MAX_CLICKS_TO_COLORS
+    shot("colored")
     window.press("bake_unwrap")  # the creature has no UV map
     window.press("wks_segment.bake")
     colors = window.wait_for("image_colors", f"{BODY} ID Map")

@@ -37,9 +37,9 @@ from .spectral.laplacian import unit_area_masses
 from .threads import one_blas_thread, one_thread
 from .user_labels import PartNotes, Unlabeled
 
-GROUPED, RECOGNIZED = 0.63, 0.9
+GROUPED, RECOGNIZED = 0.75, 0.94
 """Shares of the time of learning from described poses after which the parts are found and merged, and their regions
-are known: means of ten characters."""
+are known: means of five characters."""
 
 
 class PoseSegmentation(PoseLabeling, Estimator):

@@ -54,6 +54,14 @@ def test_what_is_shown_and_rendered_stays(obj):
     assert mesh.color_attributes.render_color_index == own
 
 
+def test_without_colors_nothing_is_shown_or_rendered(obj, capfd):
+    mesh = obj.data
+    write_labels(mesh, stripes(mesh), OutputOptions(ucupaint=True, colors=False))
+    shown = [mesh.attributes.active_color_name, mesh.attributes.default_color_name]
+    assert (shown, mesh.color_attributes.render_color_index) == (["", ""], -1)
+    assert "error" not in "".join(capfd.readouterr()), "Blender complains on the terminal"
+
+
 def test_color_ids_of_the_artist_stay(obj):
     mesh = obj.data
     mesh.color_attributes.new(COLOR_IDS, "BYTE_COLOR", "CORNER").data[0].color_srgb = (0.2, 0.4, 0.6, 1.0)

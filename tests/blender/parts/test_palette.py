@@ -161,3 +161,12 @@ def test_every_palette_is_srgb_and_has_nothing_black_and_a_left_lighter_than_the
     assert left[:, 0].min() > right[:, 0].max() + 0.04
     in_bytes = np.rint(255 * colors).reshape(-1, 3)
     assert len(np.unique(in_bytes, axis=0)) == 3 * MAX_COLORS
+
+
+FIELD_LETTERS = 20
+"""Letters of a name that the field in the sidebar shows, about: it cuts off the rest."""
+
+
+@pytest.mark.parametrize("name", module.RECIPES)
+def test_names_of_palettes_fit_into_the_field(name):
+    assert len(module.RECIPES[name].title) <= FIELD_LETTERS

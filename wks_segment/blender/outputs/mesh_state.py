@@ -99,7 +99,7 @@ class MeshState:
         mesh, (colors, rendered_color, active_uv, rendered_uv, active) = self._mesh, self._actives
         for name, value in colors.items():
             setattr(mesh.attributes, name, value)
-        if mesh.color_attributes.render_color_index != rendered_color:
+        if mesh.color_attributes.render_color_index != rendered_color >= 0:
             mesh.color_attributes.render_color_index = rendered_color
         for layer in mesh.uv_layers:
             if layer.name == active_uv:

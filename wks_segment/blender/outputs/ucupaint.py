@@ -36,10 +36,11 @@ class UcupaintColors:
                 Message('"{mesh}" has color IDs of Ucupaint already, they stay as they are', mesh=mesh.name)
             )
             return
-        shown, rendered = mesh.color_attributes.active_color_name, mesh.color_attributes.render_color_index
+        # By name, since an index cannot be set to that of none.
+        before = {name: getattr(mesh.attributes, name) for name in ("active_color_name", "default_color_name")}
         attribute = mesh.color_attributes.new(COLOR_IDS, "FLOAT_COLOR", "CORNER")
-        mesh.color_attributes.active_color_name = shown
-        mesh.color_attributes.render_color_index = rendered
+        for name, value in before.items():
+            setattr(mesh.attributes, name, value)
         ledger["color_ids"] = attribute.name
         present, of_polygons = np.unique(parts.of_polygons, return_inverse=True)
         colors = parts.options.style.colors_of(present)

@@ -109,7 +109,7 @@ RECIPES = {
         (0.45, 0.97), (0.04, 0.40), (0.72, 0.97), (0.45, 0.64), radians(90), color_blind=True,
     ),
     "maximal": Recipe(
-        1, "Maximally Different (Old)",
+        1, "Different (Old)",
         "The colors that Maximally Different had before; files that have them keep them",
         (0.30, 0.97), (0.06, 0.40),
     ),

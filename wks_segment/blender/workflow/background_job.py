@@ -20,9 +20,12 @@ from .passing_message import PassingMessage
 
 TIMER_INTERVAL = 0.1
 """Seconds between two looks at a job. With more the bar moves in jumps; with less Blender redraws for nothing."""
-ESTIMATE_AFTER_SECONDS, ESTIMATE_AFTER_SHARE = 2.0, 0.15
-"""Seconds and share of the work before the first estimate of the time left: an earlier one would be far off. On nine
-characters the first one was 0.6 to 1.3 times the truth, and up to 2.3 times off after three hundredths of the work."""
+ESTIMATE_AFTER_SECONDS, ESTIMATE_AFTER_SHARE = 2.0, 0.2
+"""Seconds and share of the work before the first estimate of the time left: an earlier one would be far off.
+`python -m benchmarks.first_estimate` compares the first one with the truth."""
+FORGETTING = 3
+"""Power of the share by which what was said earlier counts less. With 1, first estimates were up to twice too long,
+because the share rises late at the beginning; with more, a single leap decides."""
 STANDING = 0.5
 """Least time left while the share stands, relative to what time and share would say if it was about to rise. With more
 the shown time grows in each long step; with less it would run out before a step ends that takes longer than others."""
@@ -41,8 +44,8 @@ class Canceled(Exception):  # noqa: N818  # not an error, only the way out of th
 class TimeLeft:
     """Estimate of the seconds that are left.
 
-    The share of the work that is done grows by leaps, and is right when it has just risen: only then it counts, by as
-    much as it has risen. While it stands the time left runs down.
+    The share of the work that is done grows by leaps, and is right when it has just risen: only then it counts, the
+    more the later. While it stands the time left runs down.
     """
 
     def __init__(self) -> None:
@@ -53,11 +56,16 @@ class TimeLeft:
     def update(self, seconds: float, share: float) -> None:
         """Take into account that a share of the work was done after some seconds."""
         if share > self._share:
-            weight = 1.0 if self._total is None else 1 - self._share / share
+            weight = 1.0 if self._total is None else 1 - (self._share / share) ** FORGETTING
             self._total = (self._total or 0.0) * (1 - weight) + seconds / share * weight
             self._share = share
         if self._total is not None and seconds >= ESTIMATE_AFTER_SECONDS and share >= ESTIMATE_AFTER_SHARE:
             self._left = max(self._total - seconds, STANDING * seconds * (1 / share - 1))
+
+    @property
+    def seconds(self) -> float | None:
+        """The estimate; None as long as there is none."""
+        return self._left
 
     @property
     def text(self) -> str:

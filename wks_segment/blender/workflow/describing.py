@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from ...core.poses.describe import Duration
 
 
+CONNECTED_TO_LEARN, CONNECTED_TO_LABEL = 0.02, 0.08
+"""Share of the time of a job after which the poses are connected, if signatures are new: means of five characters."""
+
+
 @dataclass(frozen=True)
 class Run:
     """What a computation reports to, and what it may use.
@@ -126,8 +130,9 @@ def describe_to_label(
 
     prepared = prepare(model, poses, run)
     share = prepared.describing_share(model, poses, LABELING)
-    described = describe(model, poses, run.with_progress(run.progress.part(0.0, share)), prepared)
-    return described, run.progress.part(share, 1.0)
+    progress = run.progress.part(CONNECTED_TO_LABEL, 1.0) if share > 0 else run.progress
+    described = describe(model, poses, run.with_progress(progress.part(0.0, share)), prepared)
+    return described, progress.part(share, 1.0)
 
 
 def _connections(model: core.PoseSegmentation, poses: Sequence[Pose], progress: Progress) -> list[core.Connection]:

@@ -31,7 +31,7 @@ from ..scene.characters import Character, polygon_ranges, vertex_ranges
 from ..scene.mesh_arrays import Body
 from ..scene.poses import Pose
 from . import carry_over, model_library, segment_list
-from .describing import Prepared, Run, describe, prepare
+from .describing import CONNECTED_TO_LEARN, Prepared, Run, describe, prepare
 from .report import Report
 from .teaching import Lesson
 
@@ -123,8 +123,9 @@ def learn(
     prepared = prepare(model, poses, run)
     run = _draft(model, poses, run, prepared)
     share = prepared.describing_share(model, poses, LEARNING)
-    described = describe(model, poses, run.with_progress(run.progress.part(0.0, share)), prepared)
-    progress = run.progress.part(share, 1.0).titled("Learning the segments")
+    progress = run.progress.part(CONNECTED_TO_LEARN, 1.0) if share > 0 else run.progress
+    described = describe(model, poses, run.with_progress(progress.part(0.0, share)), prepared)
+    progress = progress.part(share, 1.0).titled("Learning the segments")
     with run.report.stage("mixture"):
         try:
             if lesson is None:

@@ -24,7 +24,7 @@ from ..poses.pose_signature import PoseSignature, of_one_mesh
 from ..progress import Progress
 from .learned_areas import with_learned_areas
 from .own_parts import OwnParts, own_parts
-from .polygons import Cleaning, PolygonMesh
+from .polygons import AVERAGED, Cleaning, PolygonMesh
 from .region_atlas import RegionAtlas
 from .sides import have_counterpart, side_field, sides_in_pose
 from .taught_sides import halves
@@ -128,7 +128,8 @@ class Labeler:
         With `polygons` None, each triangle is a polygon.
         """
         mesh = self._polygon_mesh(poses, polygons)
-        posteriors = self._mean_posteriors(mesh, poses, polygons is not None, self.n_segments, progress)
+        step = progress.part(0.0, AVERAGED)
+        posteriors = self._mean_posteriors(mesh, poses, polygons is not None, self.n_segments, step)
         cleaning = Cleaning(CutStyle(self.length), min_share, STRAY_SHARE if min_share > 0 else 0.0)
         labels, neighbors = mesh.labels(poses, posteriors, cleaning, marked)
         if self.taught is None:
@@ -137,7 +138,7 @@ class Labeler:
         if len(self.taught.sided) and self.sides_atlas is not None:
             votes = [
                 halves(mesh.of_faces(field, i), labels, neighbors, mesh.areas)
-                for i, field in self._fields_of_sides(self.sides_atlas, poses, progress)
+                for i, field in self._fields_of_sides(self.sides_atlas, poses, progress.part(AVERAGED, 1.0))
             ]
             sides = np.where(np.mean(votes, axis=0) < 0, -1, 1)
         return self.taught.parts(labels, sides), neighbors

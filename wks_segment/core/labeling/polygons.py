@@ -19,6 +19,8 @@ from ..progress import Progress
 MARKED_COST = 0.1
 """Cost of a border along a marked edge, as a fraction of its cost elsewhere: low enough that a border moves to a marked
 edge within reach, and high enough that marked edges alone make no border."""
+AVERAGED = 0.4
+"""Share of the time of labeling after which the posteriors of all poses are averaged; the graph cut cannot report."""
 BEGINNING = 0.4
 """Share of a pose's progress that is reported before it is labeled, since nothing can be reported in between."""
 

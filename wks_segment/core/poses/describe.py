@@ -38,7 +38,7 @@ BESIDE_EIGENPAIRS = 1.5
 SIGNATURE_BYTES = 16
 """Bytes of a number of a signature while it is computed and standardized: it is there twice."""
 
-SURFACE = 0.06
+SURFACE = 0.07
 """Share of the time of a pose after which its surface is prepared."""
 
 

@@ -48,10 +48,10 @@ LARGEST_OVERLAP = 0.01
 not part them."""
 MAX_CORRECTIONS = 4
 """Most corrections before a coarse space with more cells is tried."""
-FACTORED, COARSE_SOLVED, CERTAIN = 0.1, 0.55, 0.9
+FACTORED, COARSE_SOLVED, CERTAIN = 0.09, 0.59, 0.95
 """Shares of the time of a solve after which the operator is factorized, the coarse space is solved, and the pairs are
-certain."""
-FIRST_CORRECTION, ROUND = 0.4, 0.6
+certain: means of five characters, as all shares here."""
+FIRST_CORRECTION, ROUND = 0.33, 0.6
 """Share of the time between the last two that the first correction takes, and share of the rest that each further round
 takes; most shapes need one or two."""
 CELL_LEVEL_ABOVE = 180_000
@@ -174,6 +174,7 @@ def _solve(
             correction = corrections[attempt.double]
             progress(FACTORED)
             pairs = attempt.start(correction.operator, n_cells, n_zero, n_pairs, progress.part(FACTORED, COARSE_SOLVED))
+            progress(COARSE_SOLVED)
             shares = progress.part(COARSE_SOLVED, CERTAIN)
             found = _corrected(correction, pairs, count, attempt.corrections, shares)
         except (SingularError, LinAlgError) as error:
@@ -190,6 +191,7 @@ def _smooth_start(
 ) -> tuple[FloatArray, FloatArray]:
     """Approximate pairs in the space of smooth functions."""
     values, sources, weights = smooth_eigenpairs(operator, n_cells, count, progress.part(0.0, 0.9))
+    progress(0.9)
     vectors = np.empty((len(operator.level.areas), len(values)), dtype=operator.dtype)
     for columns in panels(*vectors.shape):
         vectors[:, columns] = operator.factor.solve(sources @ np.ascontiguousarray(weights[:, columns]))

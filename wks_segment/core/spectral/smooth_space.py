@@ -74,11 +74,11 @@ def smooth_eigenpairs(
     level, shift, other = operator.level, operator.shift, SHIFT_RATIO * operator.shift
     functions = level.functions_over_cells(n_cells)
     sources = csr_matrix(level.mass @ functions)
-    progress(0.15)
+    progress(0.09)
     energy = ShiftedOperator(level, other, operator.dissection).factor.compressed(sources)
-    progress(0.4)
+    progress(0.42)
     mass = (operator.factor.compressed(sources) - energy) / operator.dtype(other - shift)
-    progress(0.5)  # before the dense eigenproblem, which cannot report
+    progress(0.59)  # before the dense eigenproblem, which cannot report
     energy[np.diag_indices_from(energy)] *= 1 + RAISED_DIAGONAL
     if not (np.isfinite(energy).all() and np.isfinite(mass).all()):
         raise LinAlgError("the coarse space has entries that are not finite")

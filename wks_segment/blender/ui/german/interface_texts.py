@@ -197,7 +197,7 @@ GERMAN_INTERFACE = {
     "Clearly different and easy on the eye: shading stays readable on all of them": "Klar verschieden und angenehm: Schattierung bleibt auf allen lesbar",
     "Maximally Different": "Möglichst verschieden",
     "As different as a screen can show, with neon colors, the first ones all bright": "So weit voneinander, wie ein Bildschirm es zeigt, auch Neon, die ersten alle leuchtend",
-    "Maximally Different (Old)": "Möglichst verschieden (alt)",
+    "Different (Old)": "Verschieden (alt)",
     "The colors that Maximally Different had before; files that have them keep them": "Die früheren Farben von „Möglichst verschieden“; Dateien, die sie haben, behalten sie",
     "Color-Blind Safe": "Für Farbenblinde",
     "Can be told apart by people without cones for red, green or blue, partly by lightness": "Auch ohne die Zapfen für Rot, Grün oder Blau zu unterscheiden, auch durch Helligkeit",
