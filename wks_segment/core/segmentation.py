@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from copy import copy
+from dataclasses import replace
 from functools import partial
 from os import PathLike
 from typing import Any, Literal
@@ -98,6 +99,9 @@ class PoseSegmentation(PoseLabeling, Estimator):
         its own shape, and each of its parts gets one kind. Otherwise None.
     taught_ : TaughtParts or None
         Which segments are taught parts, if `fit` was given labels: the first `taught_.n_parts` ones.
+    plan_ : BodyPlan or None
+        Where taught parts lie in the plan of a body, if one was learned that is symmetric: on others that are, it tells
+        the parts if their signatures are far from the learned ones.
     regions_ : RegionAtlas or None
         Connected regions of the learned poses; None with the paper's setting.
     sides_ : RegionAtlas or None
@@ -218,7 +222,10 @@ class PoseSegmentation(PoseLabeling, Estimator):
             if learned.grouping is not None:
                 step = overall.part(GROUPED, RECOGNIZED)
                 learned, atlases = recognized_parts(labeler_of, learned, poses, rest, step)
-        self._set_learned(learned, training.standardizer, atlases, usual_scores(learned, training))
+        scores = usual_scores(learned, training)
+        if learned.plan is not None:
+            learned = replace(learned, plan=learned.plan.below(scores))
+        self._set_learned(learned, training.standardizer, atlases, scores)
         self.part_notes_ = PartNotes()
         overall(1.0, "done")
         return self
@@ -358,7 +365,7 @@ class PoseSegmentation(PoseLabeling, Estimator):
 
     def _learned(self) -> PartMixture:
         """What was learned of the parts; NotFittedError if nothing was."""
-        return PartMixture(self._fitted(), self.grouping_, self.kind_traits_, self.taught_)
+        return PartMixture(self._fitted(), self.grouping_, self.kind_traits_, self.taught_, self.plan_)
 
     def _set_learned(
         self,
@@ -368,7 +375,8 @@ class PoseSegmentation(PoseLabeling, Estimator):
         scores: FloatArray,
     ) -> None:
         self.mixture_, self.standardizer_ = learned.mixture, standardizer
-        self.grouping_, self.kind_traits_, self.taught_ = learned.grouping, learned.traits, learned.taught
+        self.grouping_, self.kind_traits_ = learned.grouping, learned.traits
+        self.taught_, self.plan_ = learned.taught, learned.plan
         self.regions_, self.sides_ = atlases or (None, None)
         self.usual_scores_ = scores
 

@@ -7,7 +7,7 @@ a figure of boxes and clothes are, this tells the parts of a body that is symmet
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -19,6 +19,10 @@ from ..parts.body_places import COORDINATES, TURNS, BodyPlaces
 SHARED = 0.3
 """Share of the common variances in the covariance of each part, which few bodies show badly: with 0.1 and 0.5, animals
 are 0.760 and 0.783 right instead of 0.782, figures 0.610 and 0.610 instead of 0.618 (docs/dev/experiments.md)."""
+FAR = 1.0
+"""A mesh is unlike all that was learned if its `comparable_score` is so much below the usual ones: MakeHuman's bodies with
+proportions changed by up to 1.7 are there about as right by signatures as by the plan (0.85); beyond, signatures fall
+to 0.6, and figures of games have 1.8 to 7 less."""
 LEAST_VARIANCE = 1e-3
 """Least variance of a coordinate, whose values are about 1: parts of a single body may have none."""
 
@@ -33,11 +37,14 @@ class BodyPlan:
     covariances : (g, COORDINATES, COORDINATES) array
     shares : (g,) array
         Of the area; their sum is 1.
+    least_score : float
+        `comparable_score` of a mesh below which the plan counts: signatures are then unlike all that was learned.
     """
 
     means: FloatArray
     covariances: FloatArray
     shares: FloatArray
+    least_score: float = -np.inf
 
     @classmethod
     def learned(cls, bodies: Sequence[tuple[BodyPlaces, FloatArray]]) -> BodyPlan | None:
@@ -92,9 +99,13 @@ class BodyPlan:
                 best, best_fit = np.exp(joint - total[:, None]), fit
         return best
 
+    def below(self, usual_scores: FloatArray) -> BodyPlan:
+        """The plan, to count where a score is far below the usual ones."""
+        return replace(self, least_score=float(np.mean(usual_scores)) - FAR)
+
     def arrays(self) -> dict[str, FloatArray]:
         """Arrays for a model file; `of_arrays` reads them."""
-        return {f"plan_{name}": value for name, value in vars(self).items()}
+        return {f"plan_{name}": np.asarray(value) for name, value in vars(self).items()}
 
     @classmethod
     def of_arrays(cls, arrays: Mapping[str, FloatArray]) -> BodyPlan | None:
@@ -102,6 +113,7 @@ class BodyPlan:
         if "plan_means" not in arrays:
             return None
         plan = cls(*(arrays[f"plan_{name}"] for name in ("means", "covariances", "shares")))
+        plan = replace(plan, least_score=float(arrays["plan_least_score"]))
         symmetric = np.allclose(plan.covariances, plan.covariances.swapaxes(1, 2))
         if not symmetric or np.linalg.eigvalsh(plan.covariances).min() <= 0:
             raise DamagedError("plan_covariances are no covariances")

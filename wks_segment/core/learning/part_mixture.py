@@ -24,6 +24,7 @@ from ..poses.pose_cache import Workpiece, smooth_means
 from ..poses.pose_signature import of_one_mesh
 from ..poses.signature_cache import Cache, content_key
 from ..progress import Progress
+from .body_plan import BodyPlan
 from .gaussian_mixture import (
     CovarianceType,
     GaussianMixture,
@@ -75,12 +76,15 @@ class PartMixture:
         Of the kinds, in the order of the groups that these are, if several meshes were learned.
     taught : TaughtParts or None
         The first groups as parts that a user taught, if any.
+    plan : BodyPlan or None
+        Where these lie in the plan of a body, if they were taught on one that is symmetric, and nothing else was learned.
     """
 
     mixture: GaussianMixture
     grouping: MergeTree | None
     traits: KindTraits | None
     taught: TaughtParts | None = None
+    plan: BodyPlan | None = None
 
     def for_ranking(self, mixture: GaussianMixture) -> GaussianMixture:
         """A mixture of these parts as its densities tell which model fits a shape.

@@ -13,13 +13,13 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from ..geometry.creases import FINE, Normals, log_thickness
+from ..geometry.creases import FINE, Normals, curvature_across, log_thickness
 from ..geometry.heat_flow import Flows
 from ..mesh.adjacency import FaceAdjacency
 from ..mesh.canonical import order_of_faces
-from ..mesh.surface import Surface
-from ..mesh.triangle_mesh import FloatArray, IntArray
-from .evidence import tied_faces
+from ..mesh.surface import Surface, prepare_surface
+from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
+from .evidence import TIE_CURVATURE, tied_faces
 from .patches import patches_of
 
 COORDINATES = 9
@@ -32,6 +32,8 @@ MOST_ASYMMETRIC = 0.01
 of a body that is symmetric: at rest it is below 0.002, in a pose of a walk above 0.03."""
 LIMB = 0.15
 """Least length of a limb, as a share of the greatest distance from the middle: shorter ones are fingers and ears."""
+REST_VERTICES = 3000
+"""Least number of vertices of a surface of which only the places count: thickness needs as many."""
 LEAST = 1e-6
 """Least distance and area, against a division by zero."""
 
@@ -47,9 +49,10 @@ class BodyPlaces:
     areas : (p,) array
         Shares of the area.
     beside : (p,) array
-        Distance from the mirror plane, in units of the mean distance (root of the mean square) from the middle.
+        Distance from the mirror plane, in units of its root mean square.
     in_plane : (p, 2) array
-        Position in the mirror plane along the body's own axes there, in the same unit.
+        Position in the mirror plane along the body's own axes there, in units of the root mean square distance from the
+        middle: a body with its arms down is narrower than one with its arms out, but as tall.
     limbs : (p, 6) array
         What does not depend on directions: mean distance over the surface from all other places, relative to the
         least one; distances from the middle, to the tip of the limb, and from the middle to the beginning of the limb,
@@ -72,8 +75,11 @@ class BodyPlaces:
         if normal is None:
             return None
         own = FaceAdjacency.of(surface.welded_faces, original.vertices / np.sqrt(original.area))
-        pairs = _mirrored_too(np.concatenate([own.pairs, tied_faces(surface)[0]]), surface)
-        patch = _patches(surface, centers, areas, pairs)
+        ties = tied_faces(surface)[0]
+        normals = Normals(surface, flows)
+        curvature = np.append(curvature_across(surface, normals.over(FINE), own), np.full(len(ties), TIE_CURVATURE))
+        pairs, curvature = _mirrored_too(np.concatenate([own.pairs, ties]), curvature, surface)
+        patch = _patches(surface, centers, areas, pairs, curvature)
         count = int(patch.max()) + 1
         of_patches = np.maximum(np.bincount(patch, areas, count), LEAST)
 
@@ -82,12 +88,12 @@ class BodyPlaces:
 
         shares = of_patches / of_patches.sum()
         points = mean(centers)
-        thickness = log_thickness(surface, Normals(surface, flows).over(FINE), flows)
+        thickness = log_thickness(surface, normals.over(FINE), flows)
         log_thick = mean(surface.to_faces(thickness[:, None]))[:, 0]
         limbs = np.column_stack([_along_limbs(points, shares, patch[pairs]), log_thick - shares @ log_thick])
         offset = points - shares @ points
-        offset = offset / max(float(np.sqrt(shares @ np.einsum("ij,ij->i", offset, offset))), LEAST)
-        return cls(patch, shares, np.abs(offset @ normal), _in_plane(offset, shares, normal), limbs)
+        beside, in_plane = np.abs(offset @ normal)[:, None], _in_plane(offset, shares, normal)
+        return cls(patch, shares, _unit(beside, shares)[:, 0], _unit(in_plane, shares), limbs)
 
     def turned(self, turn: int) -> FloatArray:
         """(p, COORDINATES) coordinates with one of `TURNS` directions in the mirror plane as the first axis.
@@ -99,16 +105,17 @@ class BodyPlaces:
         second = self.in_plane @ [np.sin(angle), np.cos(angle)]
         return np.column_stack([self.beside, first, second * (1 - 2 * (turn % 2)), self.limbs])
 
-    def of_faces(self, values: FloatArray) -> FloatArray:
-        """(m, …) values of the faces, from (p, …) values of the patches."""
-        return values[self.patch]
-
     def areas_of(self, labels: IntArray, areas: FloatArray, count: int) -> FloatArray:
         """(p, count) share of the whole area of each label in each patch, given (m,) labels, −1 for none, and areas."""
         table = np.zeros((len(self.areas), count))
         said = labels >= 0
         np.add.at(table, (self.patch[said], labels[said]), areas[said] / areas.sum())
         return table
+
+
+def surface_at_rest(mesh: TriangleMesh) -> Surface:
+    """Surface of a mesh of which only the places count, not the signature."""
+    return prepare_surface(mesh, REST_VERTICES)
 
 
 def _mirror_normal(surface: Surface, centers: FloatArray, areas: FloatArray) -> FloatArray | None:
@@ -126,14 +133,17 @@ def _mirror_normal(surface: Surface, centers: FloatArray, areas: FloatArray) -> 
     return normal if float(np.average(beside, weights=weights)) < MOST_ASYMMETRIC else None
 
 
-def _mirrored_too(pairs: IntArray, surface: Surface) -> IntArray:
-    """Pairs of neighbors and their mirror images: of two legs that are islands, only one may be tied to the hips."""
+def _mirrored_too(pairs: IntArray, curvature: FloatArray, surface: Surface) -> tuple[IntArray, FloatArray]:
+    """Pairs of neighbors and curvatures, with their mirror images: of two legs only one may be tied to the hips."""
     assert surface.mirror is not None
     images = surface.mirror.image[pairs]
-    return np.concatenate([pairs, images[(images >= 0).all(axis=1) & (images[:, 0] != images[:, 1])]])
+    has = (images >= 0).all(axis=1)
+    return np.concatenate([pairs, images[has]]), np.append(curvature, curvature[has])
 
 
-def _patches(surface: Surface, centers: FloatArray, areas: FloatArray, pairs: IntArray) -> IntArray:
+def _patches(
+    surface: Surface, centers: FloatArray, areas: FloatArray, pairs: IntArray, curvature: FloatArray
+) -> IntArray:
     """(m,) patch of each face, found with the faces in an order that depends on the shape alone."""
     assert surface.mirror is not None
     order = order_of_faces(surface.original)
@@ -143,7 +153,7 @@ def _patches(surface: Surface, centers: FloatArray, areas: FloatArray, pairs: In
     image = np.where(image >= 0, place[image], -1)
     neighbors = FaceAdjacency(place[pairs], np.ones(len(pairs)))
     patch = np.empty(len(order), dtype=np.int64)
-    patch[order] = patches_of(centers[order], areas[order], neighbors, np.zeros(len(pairs)), image)
+    patch[order] = patches_of(centers[order], areas[order], neighbors, curvature, image)
     return patch
 
 
@@ -154,6 +164,11 @@ def _in_plane(offset: FloatArray, shares: FloatArray, normal: FloatArray) -> Flo
     along = flat @ axes
     # A direction that does not depend on the library's choice of sign.
     return np.asarray(along * np.where(shares @ along**3 < 0, -1.0, 1.0))
+
+
+def _unit(offset: FloatArray, shares: FloatArray) -> FloatArray:
+    """(p, k) offsets whose root mean square length is 1."""
+    return np.asarray(offset / max(float(np.sqrt(shares @ np.einsum("ij,ij->i", offset, offset))), LEAST))
 
 
 def _along_limbs(points: FloatArray, shares: FloatArray, pairs: IntArray) -> FloatArray:
