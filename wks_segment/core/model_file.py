@@ -272,7 +272,7 @@ def _fields(
             Field("plan_means", (g, COORDINATES)),
             Field("plan_covariances", (g, COORDINATES, COORDINATES)),
             Field("plan_shares", (g,), least=POSITIVE, most=WHOLE_SHARE),
-            Field("plan_least_score", ()),
+            Field("plan_signature_weight", (), 0.0, 1.0),
         )
     for kind in REGION_KINDS:
         r = length(content, f"{kind}_segment", MOST_REGIONS)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from copy import copy
-from dataclasses import replace
 from functools import partial
 from os import PathLike
 from typing import Any, Literal
@@ -100,8 +99,8 @@ class PoseSegmentation(PoseLabeling, Estimator):
     taught_ : TaughtParts or None
         Which segments are taught parts, if `fit` was given labels: the first `taught_.n_parts` ones.
     plan_ : BodyPlan or None
-        Where taught parts lie in the plan of a body, if one was learned that is symmetric: on others that are, it tells
-        the parts if their signatures are far from the learned ones.
+        Where taught parts lie in the plan of a body, if they were taught on several meshes, of which one is symmetric:
+        on others that are, it tells the parts together with their signatures.
     regions_ : RegionAtlas or None
         Connected regions of the learned poses; None with the paper's setting.
     sides_ : RegionAtlas or None
@@ -222,10 +221,7 @@ class PoseSegmentation(PoseLabeling, Estimator):
             if learned.grouping is not None:
                 step = overall.part(GROUPED, RECOGNIZED)
                 learned, atlases = recognized_parts(labeler_of, learned, poses, rest, step)
-        scores = usual_scores(learned, training)
-        if learned.plan is not None:
-            learned = replace(learned, plan=learned.plan.below(scores))
-        self._set_learned(learned, training.standardizer, atlases, scores)
+        self._set_learned(learned, training.standardizer, atlases, usual_scores(learned, training))
         self.part_notes_ = PartNotes()
         overall(1.0, "done")
         return self

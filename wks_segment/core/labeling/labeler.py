@@ -75,7 +75,7 @@ class Labeler:
     sides_atlas : RegionAtlas or None
         Tells these sides.
     plan : BodyPlan or None
-        Where taught parts lie in the plan of a body, if that is known: it tells them where signatures do not.
+        Where taught parts lie in the plan of a body, if that is known.
     """
 
     mixture: GaussianMixture
@@ -370,7 +370,7 @@ class Labeler:
         posteriors = self.mixture.group_posteriors(samples, self.grouping.groups(n_groups), n_groups)
         if self.plan is None or n_groups != len(self.plan.shares):
             return posteriors
-        return with_plan(posteriors, pose, self.plan, self.mixture, self.standardizer)
+        return with_plan(posteriors, pose, self.plan)
 
     def _merged(self, posteriors: FloatArray, n_groups: int) -> FloatArray:
         """(…, n_groups) sums of posteriors of finer groups over those of each group."""

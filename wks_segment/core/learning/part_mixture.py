@@ -77,7 +77,8 @@ class PartMixture:
     taught : TaughtParts or None
         The first groups as parts that a user taught, if any.
     plan : BodyPlan or None
-        Where these lie in the plan of a body, if they were taught on one that is symmetric, and nothing else was learned.
+        Where these lie in the plan of a body, if several bodies were taught, one of them symmetric, and nothing else
+        was learned.
     """
 
     mixture: GaussianMixture

@@ -11,7 +11,7 @@ from ..geometry.heat_flow import Flows
 from ..mesh.surface import Surface, shares_at_vertices
 from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
 from ..message import Message
-from ..parts.body_places import BodyPlaces, surface_at_rest
+from ..parts.body_places import BodyPlaces
 from ..parts.kinds import Kinds
 from ..poses.pose_cache import Workpiece
 from ..poses.pose_signature import of_one_mesh
@@ -94,9 +94,8 @@ def learn_taught_parts(
         chosen, group[group >= 0], axes, per_part * len(np.unique(group[group >= 0])), covariance_type
     )
     plan = None
-    if n_groups == taught.n_groups:
-        surfaces = [pose.surface for pose in poses] + ([] if rest is None else [surface_at_rest(rest)])
-        plan = plan_of(surfaces, [*lesson.of_faces, lesson.of_faces[0]], taught)
+    if not alone and n_groups == taught.n_groups:
+        plan = plan_of([pose.surface for pose in poses], lesson.of_faces, taught)
     tree = _tree(mixture, group_of, axes, training, n_groups, taught, kinds)
     return PartMixture(mixture, tree, None, taught, plan)
 
@@ -107,7 +106,7 @@ def plan_of(surfaces: Sequence[Surface], labels: Sequence[IntArray], taught: Tau
     Given (m,) taught part of each face of the original of each surface, −1 for none.
     """
     bodies = []
-    for surface, of_faces in zip(surfaces, labels, strict=False):
+    for surface, of_faces in zip(surfaces, labels, strict=True):
         places = BodyPlaces.of(surface, Flows(surface.mesh))
         if places is not None:
             group = np.where(of_faces >= 0, taught.group_of_part[of_faces], NOT_SAID)

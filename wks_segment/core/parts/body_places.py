@@ -32,8 +32,9 @@ MOST_ASYMMETRIC = 0.01
 of a body that is symmetric: at rest it is below 0.002, in a pose of a walk above 0.03."""
 LIMB = 0.15
 """Least length of a limb, as a share of the greatest distance from the middle: shorter ones are fingers and ears."""
-REST_VERTICES = 3000
-"""Least number of vertices of a surface of which only the places count: thickness needs as many."""
+REST_VERTICES = 4500
+"""Least number of vertices of a surface of which only the places count: thickness is then the same as where signatures
+were computed as well."""
 LEAST = 1e-6
 """Least distance and area, against a division by zero."""
 
