@@ -197,19 +197,20 @@ def styled(scale, ridges=0.0):
     return TriangleMesh(mesh.vertices * scale * out[:, None], mesh.faces)
 
 
-LIMBS_AND_BODY = np.where(sides_of(figure()) == 2, 1, 0)
+ARMS_AND_LEGS = np.where(np.abs(figure().face_centers[:, 0]) < 0.6, 2, np.where(figure().face_centers[:, 2] > 0, 0, 1))
+"""Part of each face of a figure: 0 arms, 1 legs, 2 the body between them."""
 
 
 @pytest.fixture(scope="module")
 def of_bodies():
     bodies = [styled((1, 1, 1)), styled((1.2, 1, 0.9)), styled((0.9, 1.2, 1))]
-    return PoseSegmentation(**SMALL).fit(bodies, labels=[LIMBS_AND_BODY] * 3)
+    return PoseSegmentation(**SMALL).fit(bodies, labels=[ARMS_AND_LEGS] * 3)
 
 
 def test_bodies_at_rest_teach_where_parts_lie_and_the_file_keeps_it(of_bodies):
     assert json.loads(of_bodies.to_json())["version"] == 7
     read = PoseSegmentation.from_json(of_bodies.to_json())
-    other = of_bodies.describe(styled((1.1, 0.9, 1), 0.1))
+    other = of_bodies.describe(styled((1, 1, 1.6), 0.15))
     np.testing.assert_array_equal(read.segment_faces(other), of_bodies.segment_faces(other))
 
 
@@ -219,10 +220,9 @@ def test_poses_of_one_mesh_and_parts_beside_others_have_no_plan(model):
 
 
 def test_the_plan_finds_parts_where_signatures_do_not(of_bodies):
-    other = styled((1.1, 0.9, 1), 0.1)
+    other = styled((1, 1, 1.6), 0.15)
     pose = of_bodies.describe(other)
     by_signatures = copy(of_bodies)
     by_signatures.plan_ = None
-    alone = share_right(other, by_signatures.segment_faces(pose), LIMBS_AND_BODY)
-    print(alone, share_right(other, of_bodies.segment_faces(pose), LIMBS_AND_BODY))
-    assert share_right(other, of_bodies.segment_faces(pose), LIMBS_AND_BODY) > max(0.9, alone + 0.05)
+    alone = share_right(other, by_signatures.segment_faces(pose), ARMS_AND_LEGS)
+    assert share_right(other, of_bodies.segment_faces(pose), ARMS_AND_LEGS) > alone + 0.2
