@@ -9,7 +9,7 @@ from ..mesh.triangle_mesh import FloatArray
 from ..parts.body_places import BodyPlaces
 from ..poses.pose_cache import Kind, ResultKey, Workpiece
 
-LEAST_POSTERIOR = 1e-12
+FAINTEST = 1e-12
 """Least posterior whose logarithm counts."""
 
 
@@ -29,8 +29,8 @@ def with_plan(posteriors: FloatArray, pose: Workpiece, plan: BodyPlan) -> FloatA
     if places is None:
         return posteriors
     by_plan = pose.surface.from_faces(plan.posteriors(places)[places.patch])
-    logs = np.log(np.maximum(by_plan, LEAST_POSTERIOR))
-    logs += plan.signature_weight * np.log(np.maximum(posteriors, LEAST_POSTERIOR))
+    logs = np.log(np.maximum(by_plan, FAINTEST))
+    logs += plan.signature_weight * np.log(np.maximum(posteriors, FAINTEST))
     result = np.exp(logs - logs.max(axis=1, keepdims=True))
     return np.asarray(result / result.sum(axis=1, keepdims=True))
 

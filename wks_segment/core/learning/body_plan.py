@@ -17,12 +17,12 @@ from ..mesh.triangle_mesh import FloatArray
 from ..parts.body_places import COORDINATES, TURNS, BodyPlaces
 
 SHARED = 0.3
-"""Share of the common variances in the covariance of each part, which few bodies show badly: with 0.1 and 0.5, animals
-are 0.760 and 0.783 right instead of 0.782, figures 0.610 and 0.610 instead of 0.618 (docs/dev/experiments.md)."""
+"""Share of the common variances in the covariance of each part, which few bodies show badly: with 0.2 and 0.5, animals
+are 0.780 and 0.783 right instead of 0.782, figures 0.607 and 0.610 instead of 0.618 (docs/dev/experiments.md)."""
 SIGNATURE_WEIGHT = 0.4
 """Usual weight of signatures, which are surer than they are right on other bodies. With 0.1 animals are best (0.79
 instead of 0.78, signatures alone 0.61), with 0.8 realistic people (0.854 instead of 0.850, alone 0.854)."""
-LEAST_VARIANCE = 1e-3
+LEAST_PLACE_VARIANCE = 1e-3
 """Least variance of a coordinate, whose values are about 1: parts of a single body may have none."""
 
 
@@ -76,7 +76,7 @@ class BodyPlan:
             squares[group] = (offset * of_group[:, None]).T @ offset / of_group.sum()
         shares = total / total.sum()
         common = np.einsum("g,gii->i", shares, squares)
-        covariances = (1 - SHARED) * squares + np.diag(SHARED * common + LEAST_VARIANCE)
+        covariances = (1 - SHARED) * squares + np.diag(SHARED * common + LEAST_PLACE_VARIANCE)
         return cls(means, covariances, shares)
 
     def log_densities(self, places: FloatArray) -> FloatArray:
