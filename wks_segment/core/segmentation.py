@@ -99,8 +99,8 @@ class PoseSegmentation(PoseLabeling, Estimator):
     taught_ : TaughtParts or None
         Which segments are taught parts, if `fit` was given labels: the first `taught_.n_parts` ones.
     plan_ : BodyPlan or None
-        Where taught parts lie in the plan of a body, if they were taught on several meshes, of which one is symmetric:
-        on others that are, it tells the parts together with their signatures.
+        Where taught parts lie in the plan of a body, if they were taught on at least three that are symmetric: on
+        others that are, it tells the parts together with their signatures.
     regions_ : RegionAtlas or None
         Connected regions of the learned poses; None with the paper's setting.
     sides_ : RegionAtlas or None

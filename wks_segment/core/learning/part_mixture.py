@@ -77,7 +77,7 @@ class PartMixture:
     taught : TaughtParts or None
         The first groups as parts that a user taught, if any.
     plan : BodyPlan or None
-        Where these lie in the plan of a body, if several bodies were taught, one of them symmetric, and nothing else
+        Where these lie in the plan of a body, if at least three symmetric bodies were taught, and nothing else
         was learned.
     """
 
