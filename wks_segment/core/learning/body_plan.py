@@ -25,8 +25,8 @@ instead of 0.78, signatures alone 0.61), with 0.8 realistic people (0.854 instea
 LEAST_PLACE_VARIANCE = 1e-3
 """Least variance of a coordinate, whose values are about 1: bodies that are alike may have none."""
 LEAST_BODIES = 3
-"""Least number of symmetric bodies to learn a plan from: one says nothing of how bodies differ, and others were labeled a
-little worse (Princeton humans, adjusted Rand index 0.756 instead of 0.758)."""
+"""Least number of symmetric bodies to learn a plan from: one says nothing of how bodies differ, and others were then
+labeled a little worse (Princeton humans, adjusted Rand index 0.756 instead of 0.758)."""
 
 
 @dataclass(frozen=True)
