@@ -20,14 +20,14 @@ UPRIGHT = ("root", "spine02", "neck01", "head")
 """Bones whose length is measured along the vertical axis, and not along the bone."""
 
 
-def other_body(body: MakeHuman, seed: int) -> MakeHuman:
-    """A body with randomly scaled bones, the same on both sides."""
+def other_body(body: MakeHuman, seed: int, most: float = MAX_SCALE) -> MakeHuman:
+    """A body with bones randomly scaled by a factor up to `most`, or by one over it, the same on both sides."""
     generator = np.random.default_rng(seed)
     whole = generator.uniform(-1, 1, 2)
     length_and_girth = {}
     for bone in SCALED:
         own = generator.uniform(-1, 1, 2)
-        length_and_girth[bone] = MAX_SCALE ** (SHARED_VARIATION * whole + (1 - SHARED_VARIATION) * own)
+        length_and_girth[bone] = most ** (SHARED_VARIATION * whole + (1 - SHARED_VARIATION) * own)
     scales = {}
     for name in body.bones:
         part = next((part for part in SCALED if name.startswith(part)), None)

@@ -1,12 +1,13 @@
 """`PoseSegmentation.fit` with labels: parts that are taught, and found again with their numbers."""
 
 import json
+from copy import copy
 
 import numpy as np
 import pytest
 from shapes import creature, figure
 
-from wks_segment.core import ModelFileError, PoseSegmentation
+from wks_segment.core import ModelFileError, PoseSegmentation, TriangleMesh
 from wks_segment.core.user_labels import UnlikePartsError
 
 SMALL = {"n_eigenpairs": 80, "n_energies": 40}
@@ -186,3 +187,42 @@ def test_a_fit_that_fails_leaves_the_model_as_it_was(model, described):
     with pytest.raises(ValueError, match="say no part"):
         model.fit(described, labels=[None, None])
     assert model.to_json() == before
+
+
+def styled(scale, ridges=0.0):
+    """A figure at rest with other proportions, and with ridges across its body and limbs."""
+    mesh = figure()
+    x, _, z = mesh.vertices.T
+    out = 1 + ridges * np.sin(12 * np.abs(x)) * np.sin(12 * z)
+    return TriangleMesh(mesh.vertices * scale * out[:, None], mesh.faces)
+
+
+ARMS_AND_LEGS = np.where(np.abs(figure().face_centers[:, 0]) < 0.6, 2, np.where(figure().face_centers[:, 2] > 0, 0, 1))
+"""Part of each face of a figure: 0 arms, 1 legs, 2 the body between them."""
+
+
+@pytest.fixture(scope="module")
+def of_bodies():
+    bodies = [styled((1, 1, 1)), styled((1.2, 1, 0.9)), styled((0.9, 1.2, 1))]
+    return PoseSegmentation(**SMALL).fit(bodies, labels=[ARMS_AND_LEGS] * 3)
+
+
+def test_bodies_at_rest_teach_where_parts_lie_and_the_file_keeps_it(of_bodies):
+    assert json.loads(of_bodies.to_json())["version"] == 7
+    read = PoseSegmentation.from_json(of_bodies.to_json())
+    other = of_bodies.describe(styled((1, 1, 1.6), 0.15))
+    np.testing.assert_array_equal(read.segment_faces(other), of_bodies.segment_faces(other))
+
+
+def test_poses_of_one_mesh_and_parts_beside_others_have_no_plan(model):
+    assert model.plan_ is None
+    assert json.loads(model.to_json())["version"] == 6
+
+
+def test_the_plan_finds_parts_where_signatures_do_not(of_bodies):
+    other = styled((1, 1, 1.6), 0.15)
+    pose = of_bodies.describe(other)
+    by_signatures = copy(of_bodies)
+    by_signatures.plan_ = None
+    alone = share_right(other, by_signatures.segment_faces(pose), ARMS_AND_LEGS)
+    assert share_right(other, of_bodies.segment_faces(pose), ARMS_AND_LEGS) > alone + 0.2

@@ -27,6 +27,7 @@ from .files.model_arrays import check_groups, check_joins, check_means, check_va
 from .files.whole_file import write_whole
 from .labeling.region_atlas import RegionAtlas
 from .labeling.traits import FIELDS, PLANES, SURROUNDINGS
+from .learning.body_plan import BodyPlan
 from .learning.gaussian_mixture import CovarianceType, GaussianMixture
 from .learning.merge_tree import MOST_SEGMENTS, MergeTree
 from .learning.parameters import PARAMETERS, check_parameters, effective
@@ -35,6 +36,7 @@ from .learning.standardizer import LEAST_SPREAD, Standardizer
 from .learning.taught_parts import MOST_TAUGHT, TaughtParts
 from .mesh.triangle_mesh import FloatArray, IntArray
 from .message import Message, message_of
+from .parts.body_places import COORDINATES
 from .user_labels import PartNotes
 
 FORMAT = "wks_segment model"
@@ -42,6 +44,9 @@ MODEL_VERSION = 5
 """To be raised whenever older programs would misread a new file, or this program an old one."""
 TAUGHT_VERSION = 6
 """Version of models of taught parts: programs that know none would number them wrongly."""
+PLAN_VERSION = 7
+"""Version of models of taught parts with their places in the plan of a body: programs that know none would find the
+numbers changed."""
 UNIONS_VERSION = 4
 """Version of models whose segments are unions of components by signature alone. They are read, and label as before."""
 MOST_CUT, BEST_WITHIN = 10.0, 0.06
@@ -122,14 +127,16 @@ def encode(model: ModelContent) -> str:
             arrays["areas"] = grouping.areas
     if model.learned.of_bodies:
         arrays["of_bodies"] = np.array(1)
-    taught = model.learned.taught
+    taught, plan = model.learned.taught, model.learned.plan
     if taught is not None:
         arrays |= taught.arrays()
+    if plan is not None:
+        arrays |= plan.arrays()
     for kind, atlas in zip(REGION_KINDS, model.atlases or (), strict=False):
         arrays |= atlas.arrays(kind)
     content = {
         "format": FORMAT,
-        "version": MODEL_VERSION if taught is None else TAUGHT_VERSION,
+        "version": PLAN_VERSION if plan is not None else MODEL_VERSION if taught is None else TAUGHT_VERSION,
         "parameters": {name: model.parameters[name] for name in PARAMETERS},
         "mixture_covariance_type": mixture.covariance_type,
         "digest": _digest(model.parameters, mixture.covariance_type, arrays),
@@ -178,10 +185,10 @@ def _decoded(content: dict[str, Any]) -> ModelContent:
         part_notes = PartNotes.of_json(content)
     except ValueError as error:
         raise DamagedError(message_of(error)) from error
-    grouping, of_bodies, taught, atlases = None, False, None, None
+    grouping, of_bodies, taught, plan, atlases = None, False, None, None, None
     if grouped:
         grouping = _grouping(arrays)
-        taught = TaughtParts.of_arrays(arrays)
+        taught, plan = TaughtParts.of_arrays(arrays), BodyPlan.of_arrays(arrays)
         of_bodies = "of_bodies" in arrays or "kind_mean" in arrays
         wholes, segments = (RegionAtlas.of_arrays(arrays, kind) for kind in REGION_KINDS)
         atlases = wholes, segments
@@ -192,6 +199,7 @@ def _decoded(content: dict[str, Any]) -> ModelContent:
             grouping,
             of_bodies,
             taught,
+            plan,
         ),
         Standardizer(effective(parameters, "scaling"), arrays["centre"], arrays["spread"]),
         atlases,
@@ -255,10 +263,17 @@ def _fields(
                 Field("kind_spread", (n_kinds,), least=LEAST_SPREAD),
                 Field("kind_touching", (n_kinds, n_kinds), least=POSITIVE, most=BELOW_ONE),
             )
-    if content["version"] == TAUGHT_VERSION:
+    if content["version"] in (TAUGHT_VERSION, PLAN_VERSION):
         g = length(content, "taught_left", MOST_TAUGHT)
         yield from (Field(f"taught_{side}", (g,), 0, MOST_TAUGHT - 1, whole=True) for side in ("left", "right"))
         yield Field("taught_of_bodies", (), 0, 1, whole=True)
+    if content["version"] == PLAN_VERSION:
+        yield from (
+            Field("plan_means", (g, COORDINATES)),
+            Field("plan_covariances", (g, COORDINATES, COORDINATES)),
+            Field("plan_shares", (g,), least=POSITIVE, most=WHOLE_SHARE),
+            Field("plan_signature_weight", (), 0.0, 1.0),
+        )
     for kind in REGION_KINDS:
         r = length(content, f"{kind}_segment", MOST_REGIONS)
         yield from (
@@ -285,7 +300,7 @@ def _content(text: str) -> dict[str, Any]:
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise ModelFileError("this is not a model of WKS Segment")
     version = content.get("version")
-    if version not in (UNIONS_VERSION, MODEL_VERSION, TAUGHT_VERSION):
+    if version not in (UNIONS_VERSION, MODEL_VERSION, TAUGHT_VERSION, PLAN_VERSION):
         if isinstance(version, int) and version < MODEL_VERSION:
             template = "the model has version {version}, this program reads {known}: learn it again"
         else:

@@ -97,6 +97,9 @@ class PoseSegmentation(PoseLabeling, Estimator):
         Whether several meshes were learned: a mesh is then cut by its own shape, and each of its regions gets one kind.
     taught_ : TaughtParts or None
         Which segments are taught parts, if `fit` was given labels: the first `taught_.n_parts` ones.
+    plan_ : BodyPlan or None
+        Where taught parts lie in the plan of a body, if they were taught on at least three that are symmetric: on
+        others that are, it tells the parts together with their signatures.
     regions_ : RegionAtlas or None
         Connected regions of the learned poses; None with the paper's setting.
     sides_ : RegionAtlas or None
@@ -357,7 +360,7 @@ class PoseSegmentation(PoseLabeling, Estimator):
 
     def _learned(self) -> PartMixture:
         """What was learned of the parts; NotFittedError if nothing was."""
-        return PartMixture(self._fitted(), self.grouping_, self.of_bodies_, self.taught_)
+        return PartMixture(self._fitted(), self.grouping_, self.of_bodies_, self.taught_, self.plan_)
 
     def _set_learned(
         self,
@@ -367,7 +370,8 @@ class PoseSegmentation(PoseLabeling, Estimator):
         scores: FloatArray,
     ) -> None:
         self.mixture_, self.standardizer_ = learned.mixture, standardizer
-        self.grouping_, self.of_bodies_, self.taught_ = learned.grouping, learned.of_bodies, learned.taught
+        self.grouping_, self.of_bodies_ = learned.grouping, learned.of_bodies
+        self.taught_, self.plan_ = learned.taught, learned.plan
         self.regions_, self.sides_ = atlases or (None, None)
         self.usual_scores_ = scores
 

@@ -13,6 +13,7 @@ from functools import partial
 import numpy as np
 
 from ..geometry.graph_cut import REGION_CREASE, REGION_WIDTH, CutStyle
+from ..learning.body_plan import BodyPlan
 from ..learning.gaussian_mixture import GaussianMixture
 from ..learning.merge_tree import MergeTree
 from ..learning.standardizer import Standardizer
@@ -20,11 +21,13 @@ from ..learning.taught_parts import TaughtParts
 from ..mesh.adjacency import FaceAdjacency
 from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
 from ..poses.pose_cache import Kind, ResultKey, Workpiece, smooth_means
-from ..poses.pose_signature import PoseSignature, of_one_mesh
+from ..poses.pose_signature import of_one_mesh
 from ..progress import Progress
 from .learned_areas import with_learned_areas
 from .own_parts import OwnParts, own_parts
+from .planned_parts import with_plan
 from .polygons import AVERAGED, Cleaning, PolygonMesh
+from .pose_steps import pose_signatures, spread_over, steps_of
 from .region_atlas import RegionAtlas
 from .sides import have_counterpart, side_field, sides_in_pose
 from .taught_sides import halves
@@ -70,6 +73,8 @@ class Labeler:
         Which of the first segments are taught parts, or two of them, which differ by their side.
     sides_atlas : RegionAtlas or None
         Tells these sides.
+    plan : BodyPlan or None
+        Where taught parts lie in the plan of a body, if that is known.
     """
 
     mixture: GaussianMixture
@@ -80,6 +85,7 @@ class Labeler:
     of_bodies: bool = False
     taught: TaughtParts | None = None
     sides_atlas: RegionAtlas | None = None
+    plan: BodyPlan | None = None
 
     @property
     def n_kept(self) -> int:
@@ -206,9 +212,9 @@ class Labeler:
         self, atlas: RegionAtlas, poses: Sequence[Workpiece], progress: Progress
     ) -> Iterator[tuple[int, FloatArray]]:
         """Index of each pose that votes on sides, and the (m,) side field on its faces."""
-        voters = _spread_over(poses, VOTERS)
+        voters = spread_over(poses, VOTERS)
         done = 0
-        for together, step in _steps([poses[i] for i in voters], progress):
+        for together, step in steps_of([poses[i] for i in voters], progress):
             regions = self._regions(atlas.n_groups, together, self.min_share, step.part(0.0, LABELS_SHARE))
             found = mean_traits([self._traits(regions, pose, len(together)) for pose in together])
             numbers = atlas.numbers_of(found)
@@ -241,9 +247,9 @@ class Labeler:
         """
         of_poses: list[Regions] = []
         traits: list[Traits] = []
-        for together, step in _steps(poses, progress):
+        for together, step in steps_of(poses, progress):
             regions = self._regions(n_groups, together, self.min_share, step.part(0.0, LABELS_SHARE))
-            measured = together if most is None else [together[i] for i in _spread_over(together, most)]
+            measured = together if most is None else [together[i] for i in spread_over(together, most)]
             for pose, _ in step.part(LABELS_SHARE, 1.0).each(measured):
                 of_poses.append(regions)
                 traits.append(self._traits(regions, pose, len(together)))
@@ -264,13 +270,13 @@ class Labeler:
             labels, neighbors = mesh.labels(poses, posteriors, cleaning)
             return Regions.of(labels, neighbors, poses[0].surface.original, group)
 
-        inputs = self.mixture, self.grouping, n_groups, self.length, min_share, *_pose_signatures(poses)
+        inputs = self.mixture, self.grouping, self.plan, n_groups, self.length, min_share, *pose_signatures(poses)
         return poses[0].results.get(ResultKey(Kind.REGIONS, len(poses)), inputs, compute)
 
     def _polygon_mesh(self, poses: Sequence[Workpiece], polygons: Sequence[IntArray] | None) -> PolygonMesh:
         # Results about all poses of a mesh are kept with the first one.
         key = ResultKey(Kind.POLYGON_MESH, len(poses), polygons is not None)
-        inputs = (*_pose_signatures(poses), *(polygons or ()))
+        inputs = (*pose_signatures(poses), *(polygons or ()))
         return poses[0].results.get(key, inputs, lambda: PolygonMesh(poses, polygons))
 
     def _mean_posteriors(
@@ -283,7 +289,7 @@ class Labeler:
             return self._with_learned_areas(mesh, found)
         of_kinds = poses[0].results.get(
             ResultKey(Kind.MEAN_POSTERIORS, len(poses), of_polygons),
-            (mesh, self.mixture, self.grouping, self.n_kept, self.length),
+            (mesh, self.mixture, self.grouping, self.plan, self.n_kept, self.length),
             lambda: self._symmetric(mesh, mesh.mean(poses, self._on_faces(poses, self.n_kept, progress), progress)),
         )
         return self._with_learned_areas(mesh, self._merged(of_kinds, n_groups))
@@ -312,7 +318,7 @@ class Labeler:
         if not self.of_bodies or self.length == 0:
             smooth = self._smooth(poses, n_groups)
             return lambda pose: pose.surface.to_faces(smooth(pose))
-        together = poses if of_one_mesh(_pose_signatures(poses)) else None
+        together = poses if of_one_mesh(pose_signatures(poses)) else None
 
         def on_faces(pose: Workpiece) -> FloatArray:
             own = self._own_parts(together or [pose], progress)
@@ -334,7 +340,7 @@ class Labeler:
             samples = self.standardizer.transform(pose.signature)
             return self.mixture.group_log_likelihoods(samples, group, n_kinds)
 
-        inputs = self.mixture, self.grouping, *_pose_signatures(poses)
+        inputs = self.mixture, self.grouping, *pose_signatures(poses)
         return poses[0].results.get(
             ResultKey(Kind.OWN_PARTS, len(poses)),
             inputs,
@@ -350,7 +356,9 @@ class Labeler:
         if not self._keeps(len(pose.signature)):
             return self._raw(pose, n_groups)
         of_kinds = pose.results.get(
-            ResultKey(Kind.POSTERIORS), (self.mixture, self.grouping, self.n_kept), lambda: self._raw(pose, self.n_kept)
+            ResultKey(Kind.POSTERIORS),
+            (self.mixture, self.grouping, self.plan, self.n_kept),
+            lambda: self._raw(pose, self.n_kept),
         )
         return self._merged(of_kinds, n_groups)
 
@@ -359,7 +367,10 @@ class Labeler:
         samples = self.standardizer.transform(pose.signature)
         if self.grouping is None:
             return self.mixture.posteriors(samples)
-        return self.mixture.group_posteriors(samples, self.grouping.groups(n_groups), n_groups)
+        posteriors = self.mixture.group_posteriors(samples, self.grouping.groups(n_groups), n_groups)
+        if self.plan is None or n_groups != len(self.plan.shares):
+            return posteriors
+        return with_plan(posteriors, pose, self.plan)
 
     def _merged(self, posteriors: FloatArray, n_groups: int) -> FloatArray:
         """(…, n_groups) sums of posteriors of finer groups over those of each group."""
@@ -379,20 +390,3 @@ class Labeler:
         )
         key = ResultKey(Kind.TRAITS, n_poses)
         return pose.results.get(key, (regions, fields), lambda: regions.traits(pose, fields))
-
-
-def _pose_signatures(poses: Sequence[Workpiece]) -> list[PoseSignature]:
-    """The described poses without their intermediate results."""
-    return [workpiece.pose for workpiece in poses]
-
-
-def _spread_over(poses: Sequence[Workpiece], most: int) -> list[int]:
-    """Numbers of at most so many of the poses: the first, the last, and some between."""
-    return sorted(set(np.linspace(0, len(poses) - 1, most).round().astype(int).tolist()))
-
-
-def _steps(poses: Sequence[Workpiece], progress: Progress) -> list[tuple[Sequence[Workpiece], Progress]]:
-    """Poses whose regions are found together, all with the same faces or each by itself, and the progress of each."""
-    if of_one_mesh(_pose_signatures(poses)):
-        return [(poses, progress)]
-    return [([pose], progress.part(i / len(poses), (i + 1) / len(poses))) for i, pose in enumerate(poses)]

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..learning.body_plan import BodyPlan
 from ..learning.gaussian_mixture import GaussianMixture
 from ..learning.merge_tree import MergeTree
 from ..learning.part_mixture import SMOOTHING_LENGTH, PartMixture
@@ -38,6 +39,7 @@ class PoseLabeling(PoseDescriber):
     grouping_: MergeTree | None
     of_bodies_: bool
     taught_: TaughtParts | None
+    plan_: BodyPlan | None
     regions_: RegionAtlas | None
     sides_: RegionAtlas | None
 
@@ -216,7 +218,7 @@ class PoseLabeling(PoseDescriber):
     def _labeler(self) -> Labeler:
         """Labeler with the learned mixture and the current settings."""
         mixture = self._fitted()
-        learned = PartMixture(mixture, self.grouping_, self.of_bodies_, self.taught_)
+        learned = PartMixture(mixture, self.grouping_, self.of_bodies_, self.taught_, self.plan_)
         return self._labeler_of(learned, self.standardizer_, self.sides_)
 
     def _labeler_of(
@@ -226,7 +228,8 @@ class PoseLabeling(PoseDescriber):
         of_mesh = taught is not None and not taught.of_bodies
         length = float(self._effective("smoothness") * (TAUGHT_LENGTH if of_mesh else SMOOTHING_LENGTH))
         n_groups = self._number_of_segments(mixture, grouping, taught)
-        return Labeler(mixture, standardizer, grouping, n_groups, length, learned.of_bodies, taught, sides)
+        plan = learned.plan
+        return Labeler(mixture, standardizer, grouping, n_groups, length, learned.of_bodies, taught, sides, plan)
 
     def _number_of_segments(
         self, mixture: GaussianMixture, grouping: MergeTree | None, taught: TaughtParts | None

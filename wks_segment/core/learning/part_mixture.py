@@ -26,6 +26,7 @@ from ..poses.pose_signature import of_one_mesh
 from ..poses.signature_cache import Cache, content_key
 from ..progress import Progress
 from .agreement import PER_KIND, agreed_kinds
+from .body_plan import BodyPlan
 from .gaussian_mixture import GaussianMixture, TooFewSamplesError, fit_mixture
 from .inside_parts import fitted_inside
 from .merge_tree import MergeTree
@@ -71,12 +72,16 @@ class PartMixture:
         Whether kinds are those of several meshes: another mesh is then cut by its own shape, and its regions get kinds.
     taught : TaughtParts or None
         The first groups as parts that a user taught, if any.
+    plan : BodyPlan or None
+        Where these lie in the plan of a body, if at least three symmetric bodies were taught, and nothing else
+        was learned.
     """
 
     mixture: GaussianMixture
     grouping: MergeTree | None
     of_bodies: bool = False
     taught: TaughtParts | None = None
+    plan: BodyPlan | None = None
 
     def for_ranking(self, mixture: GaussianMixture) -> GaussianMixture:
         """A mixture of these parts as its densities tell which model fits a shape.

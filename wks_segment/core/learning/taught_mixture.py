@@ -7,15 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from ..mesh.surface import shares_at_vertices
+from ..geometry.heat_flow import Flows
+from ..mesh.surface import Surface, shares_at_vertices
 from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
 from ..message import Message
+from ..parts.body_places import BodyPlaces
 from ..parts.kinds import Kinds
 from ..poses.pose_cache import Workpiece
 from ..poses.pose_signature import of_one_mesh
 from ..poses.signature_cache import Cache
 from ..progress import Progress
 from ..user_labels import NOT_SAID
+from .body_plan import BodyPlan
 from .gaussian_mixture import CovarianceType, GaussianMixture
 from .inside_parts import fitted_inside
 from .merge_tree import MOST_LIKENESS, MergeTree
@@ -91,7 +94,25 @@ def learn_taught_parts(
     mixture, group_of = fitted_inside(
         chosen, group[group >= 0], axes, per_part * len(np.unique(group[group >= 0])), covariance_type
     )
-    return PartMixture(mixture, _tree(mixture, group_of, axes, training, n_groups, taught, kinds), False, taught)
+    plan = None
+    if not alone and n_groups == taught.n_groups:
+        plan = plan_of([pose.surface for pose in poses], lesson.of_faces, taught)
+    tree = _tree(mixture, group_of, axes, training, n_groups, taught, kinds)
+    return PartMixture(mixture, tree, False, taught, plan)
+
+
+def plan_of(surfaces: Sequence[Surface], labels: Sequence[IntArray], taught: TaughtParts) -> BodyPlan | None:
+    """Where taught parts lie in the plan of a body; None if no symmetric surface shows each of them.
+
+    Given (m,) taught part of each face of the original of each surface, −1 for none.
+    """
+    bodies = []
+    for surface, of_faces in zip(surfaces, labels, strict=True):
+        places = BodyPlaces.of(surface, Flows(surface.mesh))
+        if places is not None:
+            group = np.where(of_faces >= 0, taught.group_of_part[of_faces], NOT_SAID)
+            bodies.append((places, places.areas_of(group, surface.original.face_areas, taught.n_groups)))
+    return BodyPlan.learned(bodies)
 
 
 def of_one_body(poses: Sequence[Workpiece]) -> bool:

@@ -33,6 +33,7 @@ class Kind(Enum):
     SIDE_FIELD = auto()
     BORDER_SHAPE = auto()
     OWN_PARTS = auto()
+    BODY_PLACES = auto()
 
 
 class ResultKey(NamedTuple):
