@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import bpy
-import numpy as np
 
-from .attributes import read_numbers
+from .attributes import read_floats
 
 
 def sculpted_surface(obj: bpy.types.Object) -> bytes:
@@ -28,7 +27,7 @@ def sculpted_surface(obj: bpy.types.Object) -> bytes:
         layer = scene.view_layers[0]
         layer.update()
         evaluated = copy.evaluated_get(layer.depsgraph).data
-        return read_numbers(evaluated.vertices, bpy.types.MeshVertex.bl_rna.properties["co"]).tobytes()
+        return read_floats(evaluated.vertices, "co", 3).tobytes()
     finally:
         bpy.data.scenes.remove(scene)
         bpy.data.objects.remove(copy)
