@@ -3,8 +3,10 @@
 Writes frames of the characters as files, one of which is broken and one of which makes Blender's importer hang forever
 (its materials are a pipe to which nobody writes), and learns a model from each: with one process, with two, with two
 Dask workers, with two Dask workers of which one is killed, and with two processes that are killed and resumed. Prints a
-Markdown table of seconds, throughput and results; the models of all runs must have the same bytes. Then it measures how
-long another number of segments takes with a cache. Needs Linux or macOS.
+Markdown table of seconds, seconds of processors, throughput and results; the models of all runs must have the same
+bytes. Seconds of processors tell the cost of Dask on a busy machine, too: of all processes of a batch and its cluster,
+without the start of the cluster. Then it measures how long another number of segments takes with a cache. Needs Linux
+or macOS.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ import argparse
 import json
 import os
 import re
+import resource
 import shutil
 import subprocess
 import sys
@@ -22,6 +25,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
+import psutil
+
 from benchmarks.speed import table_row
 
 SETTINGS = ("--segments", "6", "--no-thumbnails")
@@ -29,8 +34,8 @@ TIME_LIMIT = 60
 """Time limit of a file in seconds; the file that hangs takes all of it."""
 BROKEN_FILE, HANGING_FILE, PIPE = "broken.glb", "0_hangs.obj", "nobody_writes"
 """The file that hangs is the first by name, so that no run waits for it at the end."""
-NO_PROFILE = {"DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False"}
-"""Environment of Dask workers, as docs/batches.md has it."""
+QUIET = {"DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False", "DASK_DISTRIBUTED__ADMIN__TICK__INTERVAL": "500ms"}
+"""Environment of the scheduler and of workers, as docs/batches.md has it: they then watch themselves less often."""
 CACHED_FRAMES = 5
 FIRST_SEGMENTS, OTHER_SEGMENTS = 8, 6
 """Number of segments of the first fit, and of the one that uses its cache."""
@@ -73,24 +78,25 @@ def main() -> None:
     options.output.mkdir(parents=True)
     inputs = options.output / "in"
     write_inputs(sorted(options.characters.glob("*.glb")), inputs, options.files)
-    print("| run | seconds | files a minute | times one process | done | failed | the same models |")
-    print("|" + "---|" * 7)
+    print("| run | seconds | of processors | files a minute | times the first | done | failed | the same models |")
+    print("|" + "---|" * 8)
     first = 0.0
     for name in runs:
         if name == "cached":
             cached(sorted(options.characters.glob("*.glb")), options.output)
             continue
         out = options.output / name
-        begun = time.monotonic()
+        begun, used = time.monotonic(), _processor_seconds()
         result = RUNS[name](inputs, out)
-        seconds = time.monotonic() - begun
+        start, of_processors = result.get("start", (0.0, 0.0))
+        seconds, used = time.monotonic() - begun - start, _processor_seconds() - used - of_processors
         first = first or seconds
-        same = sum(_same(path, options.output / "one" / path.name) for path in out.glob("*.json"))
+        same = sum(_same(path, options.output / runs[0] / path.name) for path in out.glob("*.json"))
         failed = "; ".join(f"{Path(path).name}: {reason[:60]}" for path, reason in result["failed"].items())
         print(
             table_row([
-                result.get("name") or NAMES[name], f"{seconds:.0f}", f"{60 * options.files / seconds:.1f}",
-                f"{first / seconds:.2f}", str(result["done"]), failed, str(same),
+                result.get("name") or NAMES[name], f"{seconds:.0f}", f"{used:.0f}",
+                f"{60 * options.files / seconds:.1f}", f"{first / seconds:.2f}", str(result["done"]), failed, str(same),
             ]),
             flush=True,
         )  # fmt: skip
@@ -121,8 +127,11 @@ def two(inputs: Path, out: Path) -> dict[str, Any]:
 
 def dask(inputs: Path, out: Path) -> dict[str, Any]:
     """A batch with two Dask workers."""
+    begun = time.monotonic()
     with cluster() as (address, _):
-        return _finished(_batch(inputs, out, "--scheduler", address))
+        times = [process.cpu_times() for process in psutil.Process().children(recursive=True)]
+        start = time.monotonic() - begun, sum(each.user + each.system for each in times)
+        return {**_finished(_batch(inputs, out, "--scheduler", address)), "start": start}
 
 
 def killed_worker(inputs: Path, out: Path) -> dict[str, Any]:
@@ -203,6 +212,12 @@ def _finished(process: subprocess.Popen[str]) -> dict[str, Any]:
     return result
 
 
+def _processor_seconds() -> float:
+    """Seconds of processors of all processes that this one started and that have ended, with what they started."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def _lines(out: Path) -> int:
     path = out / "batch.jsonl"
     return len(path.read_text(encoding="utf-8").splitlines()) if path.exists() else 0
@@ -222,7 +237,7 @@ def cluster() -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
     def start(*arguments: str, until: str) -> str:
         command = [sys.executable, "-m", *arguments, "--no-dashboard", "--host", "127.0.0.1"]
         process = subprocess.Popen(
-            command, text=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=os.environ | NO_PROFILE
+            command, text=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=os.environ | QUIET
         )
         processes.append(process)
         stream: IO[str] | None = process.stderr

@@ -53,6 +53,19 @@ def test_no_link_is_dead(page):
             assert anchor in anchors(target), link
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_tests_that_are_named_exist(page):
+    tests = {path.name for path in (ROOT / "tests").rglob("test_*.py")}
+    text = page.read_text(encoding="utf-8")
+    assert set(re.findall(r"\btest_\w+\.py\b", text)) <= tests
+    code = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py"))
+    assert set(re.findall(r"`(test_\w+)`", text)) <= set(re.findall(r"^def (test_\w+)", code, re.MULTILINE))
+    # Kinds of damage are named in brackets behind the test of them.
+    named = [each for listed in re.findall(r"`test_any_mesh\.py` \(([^)]*)\)", text) for each in listed.split(", ")]
+    defects = (ROOT / "tests/core/defects.py").read_text(encoding="utf-8")
+    assert [each for each in named if not re.search(rf"^def {each}\(", defects, re.MULTILINE)] == []
+
+
 LIST_WITHOUT_SPACE = re.compile(r"^(?![-#\s]|\d+\. ).+\n(?:- |1\. ).*", re.MULTILINE)
 
 

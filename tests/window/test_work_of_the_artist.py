@@ -37,6 +37,8 @@ def test_a_separated_object_that_was_worked_on_stays(learned, shot):
     shot("worked on")
 
     learned.press("wks_segment.clear")
+    shot("asked first, as objects are removed")
+    learned.key("Return")
     assert learned.ask("objects").keys() == {BODY, RIG, piece}
     cleared = learned.ask("contents", piece)
     assert cleared["seams"] == worked_on["seams"]

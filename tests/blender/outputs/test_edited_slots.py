@@ -150,6 +150,17 @@ def test_slots_of_objects_keep_their_materials(settings):
     assert shown(obj) == before
 
 
+def test_a_material_that_the_artist_put_on_an_object_in_our_slot_stays(obj):
+    slot = obj.material_slots["Segment 2"]
+    slot.link, slot.material = "OBJECT", bpy.data.materials.new("Gold")
+    before = shown(obj)
+    labeled(obj)
+    assert obj.material_slots["Gold"].link == "OBJECT"
+    OPS.clear()
+    assert [slot.name for slot in obj.material_slots] == ["Skin", "Cloth", "Metal", "Gold"]
+    assert shown(obj) == ["Gold" if name == "Gold" else own for name, own in zip(before, EXPECTED, strict=True)]
+
+
 def test_mesh_without_materials(settings):
     obj = limbed(subdivisions=3)
     labeled(obj)

@@ -126,6 +126,46 @@ def test_new_labels_use_the_changed_material(obj, settings):
         assert "Segment 1" not in bpy.data.materials
 
 
+@pytest.mark.parametrize("how", ["update", "learn"])
+def test_another_number_of_segments_and_back_use_the_changed_material(obj, settings, how):
+    """Where the part has a successor; the material is never made twice."""
+    material = bpy.data.materials["Segment 1"]
+    new_node(material)
+    material.name = "Hero Skin"
+    faces = {}
+    for number in (4, 3, 2, 4, 3):
+        settings.n_segments = number
+        getattr(OPS, how)()
+        slots = [slot.material for slot in obj.material_slots]
+        assert slots.count(material) == 1
+        shown = [slots[polygon.material_index] == material for polygon in obj.data.polygons]
+        assert faces.setdefault(number, shown) == shown
+        assert sum(shown) > 0
+    names = [name for name in bpy.data.materials.keys() if name not in ("Skin", "Cloth")]  # noqa: SIM118
+    assert "Hero Skin" in names
+    assert "Hero Skin.001" not in names
+    OPS.clear()
+    assert material.use_fake_user
+    assert [each.name for each in obj.data.materials] == ["Skin", "Cloth"]
+
+
+def test_a_changed_material_stays_with_another_character(obj, settings):
+    """Which has its labels of the old set, as a second pose does that is not selected."""
+    other = limbed("Other", 0.4)
+    select(other)
+    OPS.apply()
+    material = bpy.data.materials["Segment 1"]
+    new_node(material)
+    select(obj)
+    settings.n_segments = 3
+    OPS.update()
+    assert material in list(other.data.materials)
+    assert material not in list(obj.data.materials)
+    settings.n_segments = 4
+    OPS.update()
+    assert material in list(obj.data.materials)
+
+
 def test_clear_names_what_it_keeps(obj, printed):
     before = ["Skin", "Cloth"]
     new_node(bpy.data.materials[NAME])

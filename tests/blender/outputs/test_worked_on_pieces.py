@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 from builders import limbed, select
+from mathutils import Matrix
 from painted_objects import painted, stripes
 
 from wks_segment.blender.outputs.labels import write_labels
@@ -88,6 +89,16 @@ def driver(piece):
     piece.data.shape_keys.key_blocks["Thin"].driver_add("value").driver.expression = "0.5"
 
 
+def combed(piece):
+    select(piece)
+    bpy.ops.particle.particle_edit_toggle()
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def in_a_property_of_the_scene(piece):
+    bpy.context.scene["target"] = piece
+
+
 WORK = {
     "vertex": lambda piece: setattr(piece.data.shape_keys.key_blocks[0].data[0], "co", (9, 9, 9)),
     "modifier setting": lambda piece: setattr(piece.modifiers["Sub"], "render_levels", 3),
@@ -128,6 +139,12 @@ WORK = {
         lambda other, piece: setattr(other.constraints.new("COPY_LOCATION"), "target", piece)
     ),
     "mesh used elsewhere": share_mesh,
+    "hidden face": lambda piece: setattr(piece.data.polygons[0], "hide", True),
+    "hair": combed,
+    "color that is rendered": lambda piece: setattr(piece.data.attributes, "default_color_name", "None"),
+    "order of modifiers": lambda piece: piece.modifiers.move(0, 1),
+    "asset": lambda piece: piece.asset_mark(),
+    "property of the scene": in_a_property_of_the_scene,
 }  # fmt: skip
 
 
@@ -245,3 +262,39 @@ def test_a_copy_of_a_piece_stays(pieces):
     OPS.clear()
     assert set(copies) < set(bpy.data.objects.keys())
     assert len(bpy.data.objects["Copy True"].data.polygons)
+
+
+@pytest.fixture
+def sculpted_pieces(settings):
+    """Pieces of a character with a Multires modifier."""
+    obj = limbed(subdivisions=2)
+    obj.shape_key_add(name="Basis")
+    obj.modifiers.new("Multires", "MULTIRES")
+    select(obj)
+    bpy.ops.object.multires_subdivide(modifier="Multires")
+    write_labels(obj.data, stripes(obj.data), OutputOptions())
+    OPS.separate()
+    return [other for other in bpy.data.objects if other is not obj]
+
+
+def sculpt(piece):
+    """Give the upper level of a Multires modifier another shape."""
+    evaluated = piece.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    shape = bpy.data.objects.new("Shape", bpy.data.meshes.new_from_object(evaluated))
+    shape.data.transform(Matrix.Scale(1.3, 4))
+    bpy.context.scene.collection.objects.link(shape)
+    select(piece, shape)
+    assert bpy.ops.object.multires_reshape(modifier="Multires") == {"FINISHED"}
+    bpy.data.meshes.remove(shape.data)
+
+
+def test_a_piece_whose_multires_detail_was_sculpted_stays(sculpted_pieces, printed):
+    """No property of Blender has this detail."""
+    sculpt(sculpted_pieces[1])
+    select(*sculpted_pieces)
+    printed()
+    OPS.clear()
+    assert KEPT.format("Segment 2") in printed().out
+    assert sorted(bpy.data.objects.keys()) == ["Limbed", "Segment 2"]
+    assert len(bpy.data.scenes) == 1
+    assert len(bpy.data.meshes) == 2

@@ -179,6 +179,33 @@ def test_no_setting_of_outputs_throws_frames_away(settings, name, value):
     assert ("Bake it first" in session_of(bpy.context).message) == (name == "write_seams")
 
 
+def with_particles(obj):
+    obj.modifiers.new("Sparks", "PARTICLE_SYSTEM")
+    return obj.particle_systems[0].point_cache
+
+
+def with_rigid_body(obj):
+    select(obj)
+    bpy.ops.rigidbody.world_add()
+    bpy.ops.rigidbody.object_add()
+    return bpy.context.scene.rigidbody_world.point_cache
+
+
+@pytest.mark.parametrize("source", ["FRAMES", "OBJECTS"])
+@pytest.mark.parametrize("make", [with_particles, with_rigid_body])
+def test_other_kinds_of_simulations_keep_their_frames(settings, make, source):
+    obj = limbed("Body", subdivisions=3)
+    cache = make(obj)
+    play()
+    before = cache.info
+    assert before.startswith(f"{LAST} frames"), "nothing was simulated: the test is void"
+    settings.source = source
+    select(obj)
+    refuses(LEARN, 'of "Body" is not baked.*Bake it first')
+    bpy.context.view_layer.update()
+    assert (cache.info, cache.is_outdated, bpy.context.scene.frame_current) == (before, False, LAST)
+
+
 def test_an_outdated_simulation_is_no_reason(settings):
     obj = simulated()
     select(obj)

@@ -59,5 +59,13 @@ def change_slots(mesh: bpy.types.Mesh, kept: Sequence[int], added: Sequence[Mate
     before.take_over(mesh, kept)
 
 
+def slots_of_objects(mesh: bpy.types.Mesh) -> set[int]:
+    """Indices of the slots in which an object that uses a mesh has a material of its own."""
+    objects = _objects_of(mesh)
+    return {
+        i for obj in objects for i, slot in enumerate(obj.material_slots) if slot.link == "OBJECT" and slot.material
+    }
+
+
 def _objects_of(mesh: bpy.types.Mesh) -> list[bpy.types.Object]:
     return [obj for obj in bpy.data.objects if obj.data == mesh and obj.library is None]

@@ -17,6 +17,7 @@ from ...core.mesh.triangle_mesh import BoolArray, IntArray
 from ..parts import part_ids
 from ..scene.attributes import read_attribute, read_ints
 from .ledger import Ledger, has_ledger
+from .material_slots import slots_of_objects
 from .part_attributes import labels_on
 from .part_materials import is_as_made, part_of
 
@@ -44,14 +45,15 @@ def our_slots(mesh: bpy.types.Mesh, ledger: Ledger) -> list[int]:
     own = [material for material in ledger.get("own_slots", {}).values() if part_of(material) is not None]
     found: list[int] = []
     parts: set[int] = set()
+    of_objects = slots_of_objects(mesh)
     for index, material in enumerate(mesh.materials):
         part = part_of(material)
         if part is None:
             continue
         if material in own:
             own.remove(material)
-        # A changed copy of our material in one more slot is the artist's.
-        elif part not in parts or is_as_made(material):
+        # A changed copy of our material in one more slot is the artist's, and so is what they put on an object.
+        elif index not in of_objects and (part not in parts or is_as_made(material)):
             found.append(index)
             parts.add(part)
     return found

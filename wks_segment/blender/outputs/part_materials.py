@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import bpy
@@ -21,6 +22,8 @@ PART_PROPERTY = "wks_segment_component"
 """Custom property of our materials: the part that they show."""
 LABELS_PROPERTY = "wks_segment_labels"
 """Custom property of our materials: key of the label set that the part belongs to."""
+SUCCESSORS_PROPERTY = "wks_segment_successors"
+"""Custom property of materials of ours that the artist has changed: the part that each shows in other label sets."""
 TEMPLATE_PROPERTY = "wks_segment_template"
 """Custom property of our materials that are copies: the name of the material that they were copied from."""
 OTHER_DEFAULTS = ("location", "location_absolute", "use_backface_culling_lightprobe_volume")
@@ -40,16 +43,66 @@ def part_of(material: bpy.types.Material | None) -> int | None:
 def material_of_part(part: int, style: Style, template: bpy.types.Material | None) -> bpy.types.Material:
     """The material of a part, the same one on all meshes of its label set.
 
-    One that the artist has changed is taken with these changes.
+    One that the artist has changed is taken with these changes, also from another label set: see `hand_over`.
     """
     source = "" if template is None else template.name
-    for material in bpy.data.materials:
-        is_ours = part_of(material) == part and material.library is None and not is_removed(material)
-        is_of_set = is_ours and material.get(LABELS_PROPERTY, "") == style.labels
-        if is_of_set and material.get(TEMPLATE_PROPERTY, "") == source:
-            restyle_material(material, style, name=True, color=True)
-            return material
-    return _new_material(part, style, template)
+    found = [each for each in _ours() if each.get(TEMPLATE_PROPERTY, "") == source]
+    material = next((each for each in found if _is_of(each, part, style.labels)), None)
+    if material is None:
+        material = next((each for each in found if _successors(each).get(style.labels) == part), None)
+        if material is None:
+            return _new_material(part, style, template)
+        _move(material, part, style.labels)
+    restyle_material(material, style, name=True, color=True)
+    return material
+
+
+def hand_over(meshes: Collection[bpy.types.Mesh], old: str, new: str, successors: Mapping[int, int]) -> None:
+    """Let materials of a label set that the artist has changed show their parts' successors in another set as well.
+
+    Call it before the labels of meshes change from the one set to the other. A material that something else uses stays
+    with its set.
+    """
+    materials = [each for each in _ours() if each.get(LABELS_PROPERTY, "") == old and not is_as_made(each)]
+    for material, users in _users(*materials).items():
+        before = _successors(material)
+        after = {labels: part for labels, part in before.items() if labels != new}
+        part = before.get(new, successors.get(material[PART_PROPERTY]))
+        if part is not None and users and set(users) <= set(meshes):
+            after[new] = part
+        if after != before:
+            _set(material, SUCCESSORS_PROPERTY, after)
+
+
+def _move(material: bpy.types.Material, part: int, labels: str) -> None:
+    """Make a material that of a part of another label set; going back to the old set moves it back."""
+    to = _successors(material) | {material.get(LABELS_PROPERTY, ""): part_of(material)}
+    for name, value in ((SUCCESSORS_PROPERTY, to), (PART_PROPERTY, part), (LABELS_PROPERTY, labels)):
+        _set(material, name, value)
+
+
+def _set(material: bpy.types.Material, name: str, value: Any) -> None:
+    """Set a custom property of ours; an error later brings back what was there."""
+    before = material.get(name)
+    before = before.to_dict() if hasattr(before, "to_dict") else before
+    on_failure(lambda: material.pop(name, None) if before is None else material.__setitem__(name, before))
+    material[name] = value
+
+
+def _successors(material: bpy.types.Material) -> dict[str, int]:
+    """The part that a material shows in other label sets, by their keys."""
+    kept = material.get(SUCCESSORS_PROPERTY)
+    return dict(kept.to_dict()) if hasattr(kept, "to_dict") else {}
+
+
+def _ours() -> list[bpy.types.Material]:
+    """The materials of parts in this file that are not to be removed."""
+    ours = [each for each in bpy.data.materials if part_of(each) is not None and each.library is None]
+    return [each for each in ours if not is_removed(each)]
+
+
+def _is_of(material: bpy.types.Material, part: int, labels: str) -> bool:
+    return part_of(material) == part and material.get(LABELS_PROPERTY, "") == labels
 
 
 def restyle_material(material: bpy.types.Material, style: Style, name: bool, color: bool) -> None:

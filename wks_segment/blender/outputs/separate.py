@@ -16,6 +16,7 @@ from ..parts import part_ids
 from ..parts.part_style import Style
 from ..props.label_set import style_of
 from ..scene.fingerprint import Label, fingerprint, is_made_as, label_of, made_as, users_of
+from ..scene.multires import sculpted_surface
 from ..scene.simulations import check_may_change
 from .ledger import Ledger
 from .origin import origin_of
@@ -163,7 +164,9 @@ def _state(obj: bpy.types.Object, original: bpy.types.Object | None, label: Labe
 
     own = [label_of(block) for block in users]
     names = [*own, *(name for block in users for name in sorted(map(of_other, users[block])))]
-    return f"{crc32(chr(10).join(names).encode()):08x}{fingerprint(obj, obj.data, label=of_other)}"
+    # A scene that has the object may use it once more, in a property of an add-on: that is in the counts only.
+    parts = [*names, f"{obj.users} {obj.data.users}", f"{crc32(sculpted_surface(obj)):08x}"]
+    return f"{crc32(chr(10).join(parts).encode()):08x}{fingerprint(obj, obj.data, label=of_other)}"
 
 
 def _users(obj: bpy.types.Object) -> list[list[str]]:

@@ -34,6 +34,8 @@ CHANGING_BY_THEMSELVES = frozenset({
 """Properties that change without work of an artist."""
 LASTING_CHOICES = ("active_render", "active_clone")
 """Properties whose names start with "active" as those of selections do, and that an artist chooses to last."""
+DONE_BY_BUTTONS = frozenset({"is_bind", "is_bound", "is_baked", "is_cached", "is_edited"})
+"""Read-only properties that tell what an artist did with a button: bind a modifier, bake a simulation, comb hair."""
 SELECTION_ATTRIBUTES = (".select_", ".uv_select_", ".vs.", ".es.")
 """What the names of attributes start with that hold selections."""
 OUR_PREFIX = "wks_segment"
@@ -135,6 +137,7 @@ class _Reader:
             if prop.type == "COLLECTION":
                 yield f"{name}:"
                 yield from self._collection(getattr(struct, name), depth)
+                yield from self._choices(getattr(struct, name))
             elif prop.type == "POINTER":
                 yield f"{name}:"
                 yield from self._pointer(getattr(struct, name), depth)
@@ -146,7 +149,7 @@ class _Reader:
         """Whether a property has a value that an artist chooses, rather than animation or Blender."""
         # Read-only types tell what a thing is; other read-only values follow from the rest, or from the frame.
         if prop.is_readonly and prop.type != "ENUM":
-            return False
+            return prop.identifier in DONE_BY_BUTTONS
         if prop.identifier == "use_nodes" and bpy.app.version >= (5, 0, 0):
             return False  # always true since then
         return not (self._animated and _path(struct, prop.identifier) in self._animated)
@@ -165,6 +168,13 @@ class _Reader:
             yield str(getattr(value, "name", value.bl_rna.identifier))
         else:
             yield from self._struct(value, depth + 1)
+
+    def _choices(self, items: Any) -> Iterator[str]:
+        """What was chosen of a collection as a whole, as which colors are rendered."""
+        for prop in items.bl_rna.properties if hasattr(items, "bl_rna") else ():
+            name = prop.identifier
+            if prop.type in ("INT", "STRING") and not prop.is_readonly and not name.startswith("active"):
+                yield f"{name}={getattr(items, name)}"
 
     def _collection(self, items: Any, depth: int) -> Iterator[str | bytes]:
         if len(items) == 0:

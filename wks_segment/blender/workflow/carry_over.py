@@ -16,6 +16,7 @@ import numpy as np
 from ...core.mesh.triangle_mesh import IntArray
 from ..outputs.origin import origin_of
 from ..outputs.overrides import by_hand, by_hand_of, keep_by_hand, keep_by_hand_of, model_labels
+from ..outputs.part_materials import hand_over
 from ..parts import part_ids
 from ..parts.palette import MAX_COLORS
 from ..parts.part_style import SetNotes
@@ -78,6 +79,7 @@ def change_sets(settings: WKSSegmentSettings, labels: Mapping[Character, IntArra
     if known and notes != stored:
         restyle(new)
     for old, meshes in changes.items():
+        hand_over([each.mesh for each in meshes], old, new, successors[old])
         goes_on = not known or part_ids.model_of(old) == part_ids.model_of(new)
         to = {**successors[old], **(_made(notes_of(old)) if goes_on else {})}
         for change in {each.mesh: each for each in meshes}.values():
