@@ -7,6 +7,7 @@ several bodies decides on regions: by the signatures on all of their faces, and 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,6 +86,7 @@ def own_parts(
     """
     evidence = Evidence.of(poses, None, progress.part(0.0, 0.3))
     graph = PartGraph.of(evidence, np.zeros((len(evidence.areas), 1)), progress.part(0.3, 1.0))
+    wholes = deepcopy(graph)
     grow(graph, FINEST, MOST_GROWN)
     region, ties = np.searchsorted(graph.regions, graph.region_of_faces()), TIES * graph.ties()
     areas = graph.areas[graph.regions]
@@ -95,9 +97,9 @@ def own_parts(
     among_others = costs_among_others(costs, ties, region_labels(costs, ties))
     posteriors = np.exp(among_others.min(axis=1, keepdims=True) - among_others)
     posteriors /= posteriors.sum(axis=1, keepdims=True)
-    grow(graph, OWN_PARTS, NO_LIMIT)
-    part = np.searchsorted(graph.regions, graph.region_of_faces())
-    of_parts = np.zeros((len(graph.regions), n_kinds))
+    grow(wholes, OWN_PARTS, NO_LIMIT)
+    part = np.searchsorted(wholes.regions, wholes.region_of_faces())
+    of_parts = np.zeros((len(wholes.regions), n_kinds))
     np.add.at(of_parts, part, posteriors[region] * evidence.areas[:, None])
     of_parts /= of_parts.sum(axis=1, keepdims=True)
-    return OwnParts(region, posteriors, part, of_parts, graph.touching())
+    return OwnParts(region, posteriors, part, of_parts, wholes.touching())
