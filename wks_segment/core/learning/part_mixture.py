@@ -19,7 +19,7 @@ from ..mesh.surface import shares_at_vertices
 from ..mesh.triangle_mesh import FloatArray, IntArray, TriangleMesh
 from ..message import Message, message_of
 from ..parts.evidence import Evidence
-from ..parts.kinds import Kinds, find_kinds, n_kinds_of_bodies, n_regions_of_mesh
+from ..parts.kinds import Kinds, find_kinds, least_kinds_of_bodies, n_kinds_of_bodies, n_regions_of_mesh
 from ..parts.part_graph import PartGraph
 from ..poses.pose_cache import Workpiece, smooth_means
 from ..poses.pose_signature import of_one_mesh
@@ -203,7 +203,7 @@ def kinds_of(
             for pose in of_mesh
         ]
         projected.append(np.mean(in_poses, axis=0))
-    agree = partial(_agreed, meshes=meshes, training=training, axes=axes, least=n_segments)
+    agree = partial(_agreed, meshes=meshes, training=training, axes=axes, least=least_kinds_of_bodies(n_segments))
     kinds = find_kinds(evidence, projected, n_segments, progress.part(0.5, GROWN), agree)
     if cache is not None:
         try:

@@ -106,6 +106,11 @@ def n_kinds_of_bodies(n_segments: int) -> int:
     return max(KINDS_OF_BODIES, round(KINDS_PER_SEGMENT * n_segments))
 
 
+def least_kinds_of_bodies(n_segments: int) -> int:
+    """Number of kinds that several meshes keep, the same for all numbers of segments with as many kinds."""
+    return round(n_kinds_of_bodies(n_segments) / KINDS_PER_SEGMENT)
+
+
 def find_kinds(
     meshes: Sequence[Evidence],
     signatures: Sequence[FloatArray],

@@ -335,6 +335,7 @@ GERMAN_MESSAGES = {
     "labels have a part {highest}, but no face has part {missing}: number the parts 0, 1, 2 … without gaps": "Labels haben einen Teil {highest}, aber keine Fläche hat Teil {missing}: die Teile ohne Lücken mit 0, 1, 2 … nummerieren",
     "part {part} has {count:,} faces in all labels together, but needs at least {least}: mark more of it": "Teil {part} hat in allen Labels zusammen {count:,} Flächen, braucht aber mindestens {least}: mehr davon markieren",
     "parts {first} and {second} cannot be told apart: they have the same shape, and are not left and right of each other. Teach them as one part": "die Teile {first} und {second} sind nicht zu unterscheiden: sie haben die gleiche Form und sind nicht links und rechts voneinander. Als einen Teil lehren",
+    "plan_covariances are no covariances": "plan_covariances sind keine Kovarianzen",
     "taught_left and taught_right do not have each part once": "taught_left und taught_right haben nicht jeden Teil einmal",
     "{names} is unlike all that the starter models ({models}) learned: check the parts, or learn a model from poses or from your own parts": "{names} gleicht nichts, woraus die beiliegenden Modelle ({models}) gelernt wurden: die Teile prüfen, oder ein Modell aus Posen oder aus eigenen Teilen lernen",
 }
