@@ -165,6 +165,17 @@ def test_the_estimate_of_a_model_with_thousands_of_eigenpairs_is_large(text):
     assert PoseSegmentation.from_json(json.dumps(content)).estimate([creature(0.0, 2)])[0] > 1000
 
 
+@pytest.fixture(scope="module")
+def text_with_traits(text_of_bodies):
+    """As files were written before: with sizes and neighbors of kinds in place of the word that it is of bodies."""
+    content = json.loads(text_of_bodies)
+    count = content["n_kinds"]
+    content.pop("digest")
+    content.pop("of_bodies")
+    traits = {"mean": [-2.0] * count, "spread": [0.5] * count, "touching": [[0.5] * count] * count}
+    return json.dumps(content | {f"kind_{name}": values for name, values in traits.items()})
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -178,8 +189,14 @@ def test_the_estimate_of_a_model_with_thousands_of_eigenpairs_is_large(text):
         (lambda c: c["kind_mean"].__setitem__(0, float("nan")), "kind_mean has a number that is not finite"),
     ],
 )
-def test_damaged_traits_of_kinds_are_refused_with_the_reason(text_of_bodies, change, message):
-    check_refused(text_of_bodies, change, message)
+def test_damaged_traits_of_kinds_are_refused_with_the_reason(text_with_traits, change, message):
+    check_refused(text_with_traits, change, message)
+
+
+def test_a_model_of_bodies_with_traits_of_its_kinds_is_one_of_bodies(text_of_bodies, text_with_traits):
+    model = PoseSegmentation.from_json(text_with_traits)
+    assert model.of_bodies_
+    assert model.to_json() == text_of_bodies
 
 
 def test_a_file_may_have_as_many_components_as_a_fit_makes():
