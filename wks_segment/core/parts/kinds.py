@@ -243,8 +243,9 @@ class _Merging:
         of_faces = [start[region] for start, region in zip(self._start, self._first, strict=True)]
         merges, likeness = [], []
         left = set(range(self._count))
-        for kind in left:
-            self._merge(kind, kind)
+        if len(self._graphs) > 1:  # on one mesh, regions of a kind that touch are left and right
+            for kind in left:
+                self._merge(kind, kind)
         table = np.full((self._count, self._count), -np.inf)
         areas = self._areas()
         for i in left:
