@@ -1,10 +1,11 @@
-"""Make the two pictures of docs/parts.md: `python -m scripts.parts_pictures DATA [--signatures FOLDER]`.
+"""Make pictures of parts on other bodies: `python -m scripts.parts_pictures DATA [--signatures FOLDER]`.
 
     parts_human      the starter model *Human* on five people of the Princeton benchmark
     parts_quadruped  five animals, each by a model that was taught on the others as *Quadruped* is
+    bodies           ten people, five of whom were learned together, without any name
 
-None of these meshes was taught; below each is the share of its area whose name is right. DATA is the folder of
-`benchmarks.taught`. Needs bpy and Pillow (`make` installs both in .venv).
+The first two are in docs/parts.md: none of their meshes was taught, and below each is the share of its area whose name
+is right. The last one is in docs/gallery.md. DATA is the folder of `benchmarks.taught`. Needs bpy and Pillow (`make` installs both in .venv).
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from benchmarks import rigs
+from benchmarks import princeton, rigs
 from benchmarks.pictures import Shape, picture
 from benchmarks.taught import named_right, on_rig
 from scripts import make_starter_models as starters
@@ -41,6 +42,7 @@ def main() -> None:
     options = parser.parse_args()
     cache = None if options.signatures is None else DiskCache(options.signatures)
     save("parts_human", people(options.data / "psb", cache))
+    save("bodies", bodies(options.data / "psb", options.signatures), columns=5)
     with tempfile.TemporaryDirectory() as rig_cache:
         save("parts_quadruped", animals(options.data / "characters", cache, Path(rig_cache)), y_is_up=False)
 
@@ -60,6 +62,14 @@ def people(folder: Path, cache: DiskCache | None) -> list[Shape]:
     return shapes
 
 
+def bodies(folder: Path, signatures: Path | None) -> list[Shape]:
+    """People who were learned together, and others, with the segments that all of them share."""
+    described = list(princeton.read(folder, "human", signatures)[1].values())
+    model = PoseSegmentation().fit([described[i] for i in princeton.LEARNED_SHAPES])
+    numbers = {i: "learned" if i in princeton.LEARNED_SHAPES else "not learned" for i in range(10)}
+    return [(how, described[i].surface.original, model.segment_faces(described[i])) for i, how in numbers.items()]
+
+
 def animals(folder: Path, cache: DiskCache | None, rig_cache: Path) -> list[Shape]:
     """Each animal by a model of the others."""
     lesson = starters.quadruped_lesson(folder, cache, rig_cache)
@@ -71,11 +81,11 @@ def animals(folder: Path, cache: DiskCache | None, rig_cache: Path) -> list[Shap
     return shapes
 
 
-def save(name: str, shapes: Sequence[Shape], y_is_up: bool = True) -> None:
-    """Render meshes side by side to a small file of the docs."""
+def save(name: str, shapes: Sequence[Shape], y_is_up: bool = True, columns: int | None = None) -> None:
+    """Render meshes to a small file of the docs, side by side if no number of columns is given."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "picture.png")
-        picture(shapes, path, columns=len(shapes), y_is_up=y_is_up)
+        picture(shapes, path, columns=columns or len(shapes), y_is_up=y_is_up)
         with Image.open(path) as large:
             size = (PIXELS, PIXELS * large.height // large.width)
             small = large.convert("RGB").resize(size, Image.Resampling.LANCZOS)
