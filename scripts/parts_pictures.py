@@ -5,7 +5,8 @@
     bodies           ten people, five of whom were learned together, without any name
 
 The first two are in docs/parts.md: none of their meshes was taught, and below each is the share of its area whose name
-is right. The last one is in docs/gallery.md. DATA is the folder of `benchmarks.taught`. Needs bpy and Pillow (`make` installs both in .venv).
+is right. The last one is in docs/gallery.md. DATA is the folder of `benchmarks.taught`. Needs bpy and Pillow (`make`
+installs both in .venv).
 """
 
 from __future__ import annotations
