@@ -1,4 +1,4 @@
-"""A body that was not learned is cut by its own shape, and each of its parts recognized as a whole."""
+"""A body that was not learned is cut by its own shape, and its regions are recognized together."""
 
 import numpy as np
 import pytest

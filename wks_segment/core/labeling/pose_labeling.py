@@ -75,8 +75,9 @@ class PoseLabeling(PoseDescriber):
 
         `min_share` is 0.005 if not given, and 0 without smoothing. Unless it is 0, no region is smaller than 15 % of
         the largest one of its segment either. An island that is smaller as a whole takes the label of its surroundings.
-        With a model of several meshes, and smoothing, the mesh is cut by its own shape, and the segment is that of a
-        whole part. Faces of an exactly symmetric mesh have the label of their mirror images.
+        With a model of several meshes, and smoothing, the mesh is cut into regions by its own shape, and each region
+        has one segment before borders are smoothed. Faces of an exactly symmetric mesh have the label of their mirror
+        images.
         """
         return self._labeler().segments([self._described(mesh)], None, self._min_share(min_share), Progress())[0]
 
